@@ -1,0 +1,233 @@
+"""Domains and scenes: folders of YAML, checked when they are read.
+
+A domain (`domains/<name>/`) holds `domain.yaml` (things, their names and shapes, recipes), `rules.nid`
+and `scenes/*.yaml`. Everything here is frozen data; nothing acts.
+"""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import yaml
+from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from cognitive_arch import resources
+from cognitive_arch.errors import ConfigError, one_line, unknown
+
+Positive = Annotated[float, Field(gt=0, le=2.0)]
+Name = Annotated[str, Field(pattern=r"^[A-Z][A-Za-z0-9]*(-[A-Za-z0-9]+)*$")]
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Cylinder(_Frozen):
+    """Upright cylinder, metres."""
+
+    type: Literal["cylinder"]
+    radius: Positive
+    height: Positive
+
+
+class Box(_Frozen):
+    """Box with its edges along the axes, metres (x, y, z)."""
+
+    type: Literal["box"]
+    size: tuple[Positive, Positive, Positive]
+
+    @property
+    def height(self) -> float:
+        return self.size[2]
+
+
+class Sphere(_Frozen):
+    """Ball, metres."""
+
+    type: Literal["sphere"]
+    radius: Positive
+
+    @property
+    def height(self) -> float:
+        return 2 * self.radius
+
+
+class ToolShape(_Frozen):
+    """A shaft with an optional cross bar at its far end, metres; `bar` 0 is a plain stick."""
+
+    type: Literal["tool"]
+    length: Positive
+    width: Positive
+    bar: Annotated[float, Field(ge=0, le=1.0)]
+
+    @property
+    def height(self) -> float:
+        return self.width
+
+
+Shape = Annotated[Cylinder | Box | Sphere | ToolShape, Field(discriminator="type")]
+
+
+class ObjectSpec(_Frozen):
+    """A thing the domain knows."""
+
+    kind: Literal["object", "tool"] = "object"
+    aliases: tuple[str, ...] = ()
+    shape: Shape
+    mass: Annotated[float, Field(gt=0, le=5)]
+    color: tuple[float, float, float]
+    can_pull: bool = False
+
+
+class Recipe(_Frozen):
+    """What a thing is made of, from the bottom up; each slot lists what may fill it, best first."""
+
+    aliases: tuple[str, ...] = ()
+    base: tuple[Name, ...]
+    fillings: tuple[Name, ...]
+    default: tuple[Name, ...]
+    lid: tuple[Name, ...] = ()
+
+
+class Domain(_Frozen):
+    """One `domain.yaml`."""
+
+    name: str
+    title: str
+    objects: dict[Name, ObjectSpec]
+    recipes: dict[str, Recipe] = {}
+    capabilities: dict[str, Literal["arm", "pull", "push"]] = {}
+
+    @model_validator(mode="after")
+    def _recipes_speak_of_known_things(self) -> Domain:
+        for recipe in self.recipes.values():
+            for name in (*recipe.base, *recipe.fillings, *recipe.default, *recipe.lid):
+                if name not in self.objects:
+                    raise ValueError(unknown("object in a recipe", name, self.objects))
+        return self
+
+    @property
+    def folder(self) -> Path:
+        return resources.domains_dir() / self.name
+
+    @property
+    def rules_path(self) -> Path:
+        return self.folder / "rules.nid"
+
+
+class Placement(_Frozen):
+    """Where an object lies: centre on the table (metres) and yaw (radians)."""
+
+    position: tuple[float, float]
+    yaw: float = 0.0
+
+    @field_validator("position")
+    @classmethod
+    def _finite(cls, value: tuple[float, float]) -> tuple[float, float]:
+        if not all(math.isfinite(v) and abs(v) <= 2 for v in value):
+            raise ValueError("a position is two finite numbers of metres, at most 2 from the robot")
+        return value
+
+
+class Table(_Frozen):
+    """The table's top, metres above the root frame's origin."""
+
+    height: float = -0.096
+
+
+class ReachLimits(_Frozen):
+    """Published reach constants (metres), used where no kinematic model answers.
+
+    A place is within reach if x >= `min_x`; y < -`side` only the left arm gets there, y > `side` only
+    the right one.
+    """
+
+    min_x: float = -0.49
+    side: Annotated[float, Field(ge=0)] = 0.15
+
+
+class Scene(_Frozen):
+    """One `scenes/*.yaml`: which objects lie where when an episode starts."""
+
+    name: str
+    title: str = ""
+    domain: str = "sandwich"
+    table: Table = Table()
+    reach: ReachLimits = ReachLimits()
+    objects: dict[Name, Placement] = Field(min_length=1)
+
+
+def _read_yaml(path: Path, what: str) -> Any:
+    try:
+        text = path.read_text(encoding="utf-8")
+    except FileNotFoundError:
+        raise ConfigError(f"no {what} file at {path}") from None
+    except (OSError, UnicodeDecodeError) as error:
+        raise ConfigError(f"cannot read the {what} file {path}: {one_line(error)}") from None
+    try:
+        data = yaml.safe_load(text)
+    except (yaml.YAMLError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        where = f", line {mark.line + 1}" if mark else ""
+        problem = one_line(getattr(error, "problem", None) or error)
+        raise ConfigError(f"{path}{where}: not valid YAML: {problem}") from None
+    if not isinstance(data, dict):
+        raise ConfigError(f"{path}: a {what} file is a mapping of fields, this is {type(data).__name__}")
+    return data
+
+
+def _explain(error: ValidationError, path: Path, model: type[BaseModel]) -> ConfigError:
+    first = error.errors(include_url=False)[0]
+    place = ".".join(str(part) for part in first["loc"]) or "(top level)"
+    more = error.error_count() - 1
+    rest = f" (and {more} more)" if more else ""
+    fields = ", ".join(model.model_fields)
+    return ConfigError(f"{path}: {place}: {one_line(first['msg'], 300)}{rest}; fields: {fields}")
+
+
+def domain_names() -> tuple[str, ...]:
+    """Names of the domains that come with the installation, sorted."""
+    return tuple(sorted(p.parent.name for p in resources.domains_dir().glob("*/domain.yaml")))
+
+
+def load_domain(name: str) -> Domain:
+    """Read `domains/<name>/domain.yaml`; raises `ConfigError` naming the file and field."""
+    if name not in domain_names():
+        raise ConfigError(unknown("domain", name, domain_names()))
+    path = resources.domains_dir() / name / "domain.yaml"
+    try:
+        return Domain.model_validate(_read_yaml(path, "domain"))
+    except ValidationError as error:
+        raise _explain(error, path, Domain) from None
+
+
+def scene_paths() -> dict[str, Path]:
+    """Scenes that come with the installation: name -> file, sorted by name."""
+    paths = sorted(resources.domains_dir().glob("*/scenes/*.yaml"))
+    return {p.stem: p for p in paths}
+
+
+def load_scene(name_or_path: str) -> Scene:
+    """Read a scene by its name or from a file (anything with a slash or ending in .yaml).
+
+    Raises `ConfigError` if there is none, or it is malformed, or speaks of objects its domain does not
+    know.
+    """
+    known = scene_paths()
+    if name_or_path in known:
+        path = known[name_or_path]
+    elif name_or_path.endswith((".yaml", ".yml")) or "/" in name_or_path:
+        path = Path(name_or_path)
+    else:
+        raise ConfigError(unknown("scene", name_or_path, known) + ", or the path of a .yaml file")
+    try:
+        scene = Scene.model_validate(_read_yaml(path, "scene"))
+    except ValidationError as error:
+        raise _explain(error, path, Scene) from None
+    domain = load_domain(scene.domain)
+    for name in scene.objects:
+        if name not in domain.objects:
+            raise ConfigError(f"{path}: {unknown('object', name, domain.objects)}")
+    return scene

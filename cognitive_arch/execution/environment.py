@@ -1,0 +1,80 @@
+"""The environment protocol: the planning cycle's only door to a world, simulated or real."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from enum import StrEnum
+from typing import Protocol, runtime_checkable
+
+from cognitive_arch.relational.symbols import GroundAction
+from cognitive_arch.world.observation import Observation
+
+
+class Outcome(StrEnum):
+    """How an attempted action ended, as far as the executing side can tell."""
+
+    SUCCESS = "success"
+    FAILURE = "failure"
+
+
+class FailureReason(StrEnum):
+    """Why an action failed; counted in logs and metrics."""
+
+    NONE = "none"
+    NOISE = "noise"  # the coin of the symbolic environment said no
+    UNKNOWN_SKILL = "unknown_skill"  # this environment cannot perform the action
+    UNKNOWN_OBJECT = "unknown_object"  # an argument is not in the world (any more)
+    HAND_BUSY = "hand_busy"
+    HAND_EMPTY = "hand_empty"
+    COVERED = "covered"  # something lies on the object or the target
+    OUT_OF_REACH = "out_of_reach"  # no arm posture reaches the place
+    NOT_GRASPED = "not_grasped"  # the fingers closed, the object did not come along
+    SLIPPED = "slipped"  # it was held and got lost on the way
+    MISPLACED = "misplaced"  # it was released and does not rest where it should
+    NO_EFFECT = "no_effect"  # carried out, nothing observable changed
+
+
+@dataclass(frozen=True, slots=True)
+class SkillResult:
+    """What one action did.
+
+    `outcome` is judged from what was observed afterwards, never asserted by the skill. `effect` holds
+    measured numbers in SI units (for example `displacement_x`, `lift`, `duration`).
+    """
+
+    outcome: Outcome
+    reason: FailureReason = FailureReason.NONE
+    effect: Mapping[str, float] = field(default_factory=dict)
+
+
+@runtime_checkable
+class Environment(Protocol):
+    """A world that can be looked at and acted in.
+
+    Law: for one construction and one `seed`, `reset` and the same sequence of actions give the same
+    observations and results, to the last bit, in any process.
+    """
+
+    skills: frozenset[str]
+    """Names of the actions this environment can perform, e.g. `graspWith`."""
+
+    def reset(self, seed: int) -> Observation:
+        """Set the scene up anew and look at it."""
+        ...
+
+    def observe(self) -> Observation:
+        """Look at the world; changes nothing."""
+        ...
+
+    def execute(self, action: GroundAction) -> SkillResult:
+        """Attempt `action`. An impossible one returns a failure with its reason, it never raises."""
+        ...
+
+    def save_artifacts(self, folder: object) -> tuple[str, ...]:
+        """Write recordings and pictures of the episode into `folder`; returns their file names."""
+        ...
+
+    def close(self) -> None:
+        """Release what the environment holds; idempotent."""
+        ...
