@@ -6,15 +6,19 @@ and `scenes/*.yaml`. Everything here is frozen data; nothing acts.
 
 from __future__ import annotations
 
+import itertools
 import math
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
+import numpy as np
 import yaml
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
 from cognitive_arch import resources
 from cognitive_arch.errors import ConfigError, one_line, unknown
+
+MIN_DISTANCE = 0.07  # metres between the centres of two objects that lie side by side
 
 Positive = Annotated[float, Field(gt=0, le=2.0)]
 Name = Annotated[str, Field(pattern=r"^[A-Z][A-Za-z0-9]*(-[A-Za-z0-9]+)*$")]
@@ -157,6 +161,24 @@ class Scene(_Frozen):
     table: Table = Table()
     reach: ReachLimits = ReachLimits()
     objects: dict[Name, Placement] = Field(min_length=1)
+
+
+def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str, Placement]:
+    """Where the objects of `scene` lie in one episode: moved by up to `amount` metres in x and y and
+    turned by any yaw, no two closer than they may lie; exactly as in the file if `amount` is 0."""
+    placements = dict(sorted(scene.objects.items()))
+    if amount <= 0:
+        return placements
+    for _ in range(200):
+        moved = {}
+        for name, placement in placements.items():
+            dx, dy, yaw = rng.uniform(-1, 1, 3)
+            x, y = placement.position
+            moved[name] = Placement(position=(x + amount * dx, y + amount * dy), yaw=math.pi * yaw)
+        pairs = itertools.combinations(moved.values(), 2)
+        if all(math.dist(a.position, b.position) >= MIN_DISTANCE for a, b in pairs):
+            return moved
+    raise ConfigError(f"objects of scene {scene.name} cannot be moved by {amount:g} m without overlap")
 
 
 def _read_yaml(path: Path, what: str) -> Any:

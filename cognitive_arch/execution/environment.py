@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
+from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 from cognitive_arch.relational.symbols import GroundAction
@@ -33,6 +34,7 @@ class FailureReason(StrEnum):
     SLIPPED = "slipped"  # it was held and got lost on the way
     MISPLACED = "misplaced"  # it was released and does not rest where it should
     NO_EFFECT = "no_effect"  # carried out, nothing observable changed
+    UNEXPECTED_EFFECT = "unexpected_effect"  # something changed, but not what the rule's first outcome says
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,11 @@ class Environment(Protocol):
         """Attempt `action`. An impossible one returns a failure with its reason, it never raises."""
         ...
 
-    def save_artifacts(self, folder: object) -> tuple[str, ...]:
+    def settle(self, seconds: float) -> None:
+        """Let the world go on for a while without acting."""
+        ...
+
+    def save_artifacts(self, folder: Path) -> tuple[str, ...]:
         """Write recordings and pictures of the episode into `folder`; returns their file names."""
         ...
 

@@ -1,0 +1,216 @@
+"""The symbolic environment: a coin decides whether an action works (thesis Sec. 6.4.6).
+
+Positions follow simple geometry, reach follows the scene's published constants. An action succeeds if a
+uniform draw is at least the noise level of its capability; a failed one changes nothing.
+"""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from cognitive_arch.domain import Domain, Placement, Scene, jittered
+from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
+from cognitive_arch.execution.noise import NoiseLevels
+from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
+from cognitive_arch.relational.symbols import GroundAction, Literal, State
+from cognitive_arch.relational.transition import covering_rule
+from cognitive_arch.world.anchoring import WorldModel
+from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
+
+PULL_DISTANCE = 0.20  # metres that a pull brings an object closer (published)
+CLEARANCE = 0.075  # metres between the centres of two things on the table
+
+_REASONS = {
+    ("on", False): FailureReason.COVERED,
+    ("isClear", True): FailureReason.HAND_BUSY,
+    ("inHand", True): FailureReason.HAND_EMPTY,
+    ("inHand", False): FailureReason.HAND_BUSY,
+    ("reachableWith", True): FailureReason.OUT_OF_REACH,
+    ("pullableWith", True): FailureReason.OUT_OF_REACH,
+}
+
+
+@dataclass(frozen=True)
+class _Thing:
+    """Where one object is: on the table at `place`, on `support`, or in `hand`."""
+
+    place: tuple[float, float]
+    yaw: float = 0.0
+    support: str | None = None
+    hand: str | None = None
+
+
+@dataclass
+class SymbolicEnvironment:
+    """Implements `Environment`; `jitter` (metres) moves the objects at the start of each episode."""
+
+    domain: Domain
+    scene: Scene
+    rules: RuleSet
+    noise: NoiseLevels = NoiseLevels()
+    jitter: float = 0.0
+    _things: dict[str, _Thing] = field(default_factory=dict)
+    _properties: frozenset[str] = frozenset()
+    _steps: int = 0
+
+    def __post_init__(self) -> None:
+        self.skills = frozenset(rule.action for rule in self.rules.rules)
+        self._rng = np.random.default_rng(0)
+        self._ground: tuple[GroundRule, ...] = ()
+
+    def reset(self, seed: int) -> Observation:
+        """See `Environment.reset`."""
+        self._rng = np.random.default_rng(seed)
+        placements: dict[str, Placement] = jittered(self.scene, self.jitter, self._rng)
+        self._things = {name: _Thing(p.position, p.yaw) for name, p in sorted(placements.items())}
+        self._properties = frozenset()
+        self._steps = 0
+        entities = [Entity(hand, "hand") for hand in HANDS]
+        entities += [Entity(name, self.domain.objects[name].kind) for name in self._things]
+        self._ground = self.rules.ground(entities)
+        return self.observe()
+
+    def observe(self) -> Observation:
+        """See `Environment.observe`."""
+        objects = tuple(self._see(name) for name in sorted(self._things))
+        hands = tuple(HandObservation(hand, self._held_by(hand)) for hand in HANDS)
+        return Observation(float(self._steps), objects, hands, (), tuple(sorted(self._properties)))
+
+    def execute(self, action: GroundAction) -> SkillResult:
+        """See `Environment.execute`."""
+        self._steps += 1
+        reason = self._obstacle(action)
+        if reason is not None:
+            return SkillResult(Outcome.FAILURE, reason)
+        rule = covering_rule(self._ground, action, self._atoms())
+        if rule is None:
+            return SkillResult(Outcome.FAILURE, FailureReason.NO_EFFECT)
+        if self._rng.random() < self.noise.of(action, self.domain.capabilities):
+            return SkillResult(Outcome.FAILURE, FailureReason.NOISE)
+        before = self._xy(action.args[0])
+        self._apply(rule)
+        after = self._xy(action.args[0])
+        effect = {"displacement_x": after[0] - before[0], "displacement_y": after[1] - before[1]}
+        return SkillResult(Outcome.SUCCESS, FailureReason.NONE, effect)
+
+    def settle(self, seconds: float) -> None:
+        """Nothing moves by itself here."""
+
+    def save_artifacts(self, folder: Path) -> tuple[str, ...]:
+        """Nothing to show: there are no pictures of symbols."""
+        return ()
+
+    def close(self) -> None:
+        """Nothing to release."""
+
+    # -- looking ------------------------------------------------------------------------------------
+
+    def _atoms(self) -> State:
+        return WorldModel().update(self.observe()).atoms()
+
+    def _held_by(self, hand: str) -> str | None:
+        return next((name for name, thing in self._things.items() if thing.hand == hand), None)
+
+    def _xy(self, name: str) -> tuple[float, float]:
+        thing = self._things[name]
+        return self._xy(thing.support) if thing.support else thing.place
+
+    def _bottom(self, name: str) -> float:
+        support = self._things[name].support
+        if support is None:
+            return self.scene.table.height
+        return self._bottom(support) + self.domain.objects[support].shape.height
+
+    def _see(self, name: str) -> ObjectObservation:
+        thing, spec = self._things[name], self.domain.objects[name]
+        x, y = self._xy(name)
+        hands = HANDS if thing.hand else self._arms_reaching(x, y)
+        tools = tuple(t for t in self._things if self.domain.objects[t].kind == "tool" and t != name)
+        pullers = tuple(t for t in tools if self.domain.objects[t].can_pull)
+        return ObjectObservation(
+            name=name,
+            kind=spec.kind,
+            position=(x, y, self._bottom(name) + spec.shape.height / 2),
+            below=(thing.support,) if thing.support else (),
+            reachable_with=(*hands, *tools),
+            pullable_with=() if hands else pullers,
+            yaw=thing.yaw,
+        )
+
+    def _arms_reaching(self, x: float, y: float) -> tuple[str, ...]:
+        reach = self.scene.reach
+        if x < reach.min_x:
+            return ()
+        left, right = y <= reach.side, y >= -reach.side
+        return tuple(hand for hand, ok in zip(HANDS, (left, right), strict=True) if ok)
+
+    # -- acting -------------------------------------------------------------------------------------
+
+    def _obstacle(self, action: GroundAction) -> FailureReason | None:
+        """Why `action` cannot even be tried now, if so."""
+        if action.name not in self.skills:
+            return FailureReason.UNKNOWN_SKILL
+        if any(arg not in self._things and arg not in HANDS for arg in action.args):
+            return FailureReason.UNKNOWN_OBJECT
+        state = self._atoms()
+        for rule in self._ground:
+            if rule.action == action:
+                for literal in rule.context:
+                    if not literal.holds(state):
+                        key = (literal.atom.predicate, literal.positive)
+                        return _REASONS.get(key, FailureReason.NO_EFFECT)
+                return None
+        return FailureReason.UNKNOWN_OBJECT
+
+    def _apply(self, rule: GroundRule) -> None:
+        """Make the first outcome true: geometry for what geometry decides, properties for the rest."""
+        moved_by_reach: set[str] = set()
+        placed = {lit.atom.args[0] for lit in rule.outcomes[0].literals if _puts(lit)}
+        for literal in rule.outcomes[0].literals:
+            name, args = literal.atom
+            if name == "inHand" and literal.positive:
+                self._things[args[0]] = replace(self._things[args[0]], place=self._xy(args[0]), support=None, hand=args[1])
+            elif name == "on" and literal.positive:
+                self._things[args[0]] = replace(self._things[args[0]], support=args[1], hand=None)
+            elif name == "inHand" and args[0] not in placed:
+                self._drop(args[0], args[1])
+            elif name == "reachableWith" and args[0] not in moved_by_reach and not self._was_held(rule):
+                moved_by_reach.add(args[0])
+                self._shift(args[0], PULL_DISTANCE if literal.positive else -PULL_DISTANCE)
+            elif name not in ("inHand", "on", "isClear", "reachableWith"):
+                change = frozenset({str(literal.atom)})
+                self._properties = self._properties | change if literal.positive else self._properties - change
+
+    @staticmethod
+    def _was_held(rule: GroundRule) -> bool:
+        """Whether the action releases its object (then reach follows from where it is dropped)."""
+        return any(lit.atom.predicate == "inHand" for lit in rule.outcomes[0].literals)
+
+    def _shift(self, name: str, dx: float) -> None:
+        x, y = self._xy(name)
+        self._things[name] = replace(self._things[name], place=(x + dx, y), support=None)
+
+    def _drop(self, name: str, hand: str) -> None:
+        self._things[name] = replace(self._things[name], place=self._free_place(name, hand), hand=None)
+
+    def _free_place(self, name: str, hand: str) -> tuple[float, float]:
+        """The free place on the table nearest to where the object was taken up, within the hand's reach."""
+        x0, y0 = self._things[name].place
+        others = [self._xy(n) for n, t in self._things.items() if n != name and t.hand is None]
+        step = CLEARANCE / 2
+        offsets = [(i * step, j * step) for i, j in itertools.product(range(-12, 13), repeat=2)]
+        for dx, dy in sorted(offsets, key=lambda d: (math.hypot(*d), d)):
+            place = (x0 + dx, y0 + dy)
+            free = all(math.dist(place, other) >= CLEARANCE for other in others)
+            if free and place[0] <= -0.2 and hand in self._arms_reaching(*place):
+                return place
+        return x0, y0
+
+
+def _puts(literal: Literal) -> bool:
+    return literal.atom.predicate == "on" and literal.positive

@@ -1,0 +1,89 @@
+"""The planner protocol and what a planning call returns."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Protocol
+
+import numpy as np
+
+from cognitive_arch.errors import PlanningError, unknown
+from cognitive_arch.relational.rules import GroundRule
+from cognitive_arch.relational.symbols import Goal, GroundAction, State
+
+
+class PlanStatus(StrEnum):
+    """How a planning call ended."""
+
+    PLAN = "plan"
+    NO_PLAN = "no_plan"
+
+
+@dataclass(frozen=True, slots=True)
+class PlanResult:
+    """The best sequence found.
+
+    `value` is the discounted sum of goal probabilities over steps 0..horizon, `goal_probability` the
+    highest probability of the goal along the sequence. Without a plan `actions` is empty and the numbers
+    are those of doing nothing.
+    """
+
+    status: PlanStatus
+    actions: tuple[GroundAction, ...]
+    value: float
+    goal_probability: float
+
+    @property
+    def action(self) -> GroundAction | None:
+        """The action to take now."""
+        return self.actions[0] if self.actions else None
+
+
+class Planner(Protocol):
+    """Anything that chooses the next actions.
+
+    Law: same arguments and a generator in the same state give the same result.
+    """
+
+    name: str
+
+    def plan(
+        self,
+        state: State,
+        goal: Goal,
+        rules: Sequence[GroundRule],
+        horizon: int,
+        rng: np.random.Generator,
+    ) -> PlanResult:
+        """Find a sequence of at most `horizon` actions that makes `goal` likely, starting from `state`.
+
+        Raises `PlanningError` if `horizon` is below 1 or `goal` is empty.
+        """
+        ...
+
+
+def check_problem(goal: Goal, horizon: int) -> None:
+    """Reject what no planner can work on; every planner calls this first."""
+    if horizon < 1:
+        raise PlanningError(f"the horizon is {horizon}; valid: 1 or more")
+    if not goal:
+        raise PlanningError("the goal is empty; a goal has at least one literal")
+
+
+def planners() -> Mapping[str, Callable[[], Planner]]:
+    """Name -> constructor of every planner, with its default settings."""
+    from cognitive_arch.planning.prada import APrada, Prada
+
+    return {"prada": Prada, "a-prada": APrada}
+
+
+PLANNER_NAMES = ("a-prada", "prada")
+
+
+def make_planner(name: str) -> Planner:
+    """The planner called `name`; raises `PlanningError` listing the known ones."""
+    if name not in PLANNER_NAMES:
+        raise PlanningError(unknown("planner", name, PLANNER_NAMES))
+    return planners()[name]()

@@ -1,0 +1,193 @@
+"""Noisy indeterministic rules, lifted and ground (thesis Sec. 6.4.5.1, Table 16).
+
+A `NIDRule` speaks of typed variables; `RuleSet.ground` turns it into `GroundRule`s over the entities of a
+scene. The noise outcome is kept apart as the probability mass that no listed outcome takes.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+from cognitive_arch.errors import GroundingError, unknown
+from cognitive_arch.relational.symbols import (
+    ALL,
+    OTHERHAND,
+    Atom,
+    GroundAction,
+    LiftedLiteral,
+    Literal,
+    Predicate,
+)
+
+
+class Entity(NamedTuple):
+    """A named thing of the scene and its type in the rules (`hand`, `object`, `tool`)."""
+
+    name: str
+    type: str
+
+
+class Parameter(NamedTuple):
+    """A typed variable of an action."""
+
+    name: str
+    type: str
+
+
+@dataclass(frozen=True, slots=True)
+class LiftedOutcome:
+    """One listed outcome: probability and the literals it makes true."""
+
+    probability: float
+    literals: tuple[LiftedLiteral, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroundOutcome:
+    """One listed outcome over named entities."""
+
+    probability: float
+    literals: tuple[Literal, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GroundRule:
+    """A rule over named entities.
+
+    `outcomes` are the listed ones, most likely first; what is missing to 1 is the noise outcome, about
+    which nothing is known.
+    """
+
+    action: GroundAction
+    context: tuple[Literal, ...]
+    outcomes: tuple[GroundOutcome, ...]
+
+    @property
+    def noise(self) -> float:
+        """Probability of the noise outcome."""
+        return max(0.0, 1.0 - sum(o.probability for o in self.outcomes))
+
+    def applies(self, state: frozenset[Atom]) -> bool:
+        """Whether the context holds in `state`."""
+        return all(literal.holds(state) for literal in self.context)
+
+    def with_first_probability(self, probability: float) -> GroundRule:
+        """The same rule with another probability of its first outcome; the rest goes to noise."""
+        first = replace(self.outcomes[0], probability=probability)
+        return replace(self, outcomes=(first, *self.outcomes[1:]))
+
+
+@dataclass(frozen=True, slots=True)
+class NIDRule:
+    """A rule over variables: action, context, listed outcomes, noise outcome."""
+
+    action: str
+    parameters: tuple[Parameter, ...]
+    context: tuple[LiftedLiteral, ...]
+    outcomes: tuple[LiftedOutcome, ...]
+    line: int = 0
+
+    def __str__(self) -> str:
+        return f"{self.action}({', '.join(p.name for p in self.parameters)})"
+
+
+@dataclass(frozen=True)
+class RuleSet:
+    """Types, predicates and rules of one domain.
+
+    `types` maps a type to its parent, or to None at the root.
+    """
+
+    types: Mapping[str, str | None]
+    predicates: Mapping[str, Predicate]
+    rules: tuple[NIDRule, ...]
+    source: str = field(default="", compare=False)
+
+    def is_a(self, type_: str, ancestor: str) -> bool:
+        """Whether `type_` is `ancestor` or below it."""
+        current: str | None = type_
+        while current is not None:
+            if current == ancestor:
+                return True
+            current = self.types.get(current)
+        return False
+
+    def ground(self, entities: Sequence[Entity], actions: frozenset[str] | None = None) -> tuple[GroundRule, ...]:
+        """All groundings over `entities`, in the order of the rules and of the sorted names.
+
+        Variables are bound to distinct entities of their type. A grounding whose context contradicts
+        itself can never apply and is left out. `actions` restricts to those action names.
+        Raises `GroundingError` for an entity whose type the rules do not know.
+        """
+        known = sorted(set(entities))
+        for entity in known:
+            if entity.type not in self.types:
+                raise GroundingError(unknown(f"type of {entity.name}", entity.type, self.types))
+        ground: list[GroundRule] = []
+        for rule in self.rules:
+            if actions is None or rule.action in actions:
+                ground.extend(self._ground_rule(rule, known))
+        return tuple(ground)
+
+    def ground_call(self, rule: NIDRule, args: Sequence[str], entities: Sequence[Entity]) -> GroundRule | None:
+        """`rule` with its parameters bound to `args`; None if its context contradicts itself."""
+        binding = dict(zip((p.name for p in rule.parameters), args, strict=True))
+        return self._bind(rule, binding, sorted(set(entities)))
+
+    def rule_for(self, action: str) -> NIDRule:
+        """The first rule of `action`; raises `GroundingError` listing the actions if there is none."""
+        for rule in self.rules:
+            if rule.action == action:
+                return rule
+        raise GroundingError(unknown("action", action, {r.action for r in self.rules}))
+
+    def _ground_rule(self, rule: NIDRule, entities: Sequence[Entity]) -> Iterator[GroundRule]:
+        choices = [[e.name for e in entities if self.is_a(e.type, p.type)] for p in rule.parameters]
+        for args in itertools.product(*choices):
+            if len(set(args)) < len(args):
+                continue
+            binding = dict(zip((p.name for p in rule.parameters), args, strict=True))
+            ground = self._bind(rule, binding, entities)
+            if ground is not None:
+                yield ground
+
+    def _bind(
+        self, rule: NIDRule, binding: Mapping[str, str], entities: Sequence[Entity]
+    ) -> GroundRule | None:
+        context = _unique(lit for lifted in rule.context for lit in self._expand(lifted, binding, entities))
+        if any(literal.negated() in context for literal in context):
+            return None
+        outcomes = tuple(
+            GroundOutcome(
+                o.probability, _unique(lit for l in o.literals for lit in self._expand(l, binding, entities))
+            )
+            for o in rule.outcomes
+        )
+        action = GroundAction(rule.action, tuple(binding[p.name] for p in rule.parameters))
+        return GroundRule(action, context, outcomes)
+
+    def _expand(
+        self, literal: LiftedLiteral, binding: Mapping[str, str], entities: Sequence[Entity]
+    ) -> Iterator[Literal]:
+        types = self.predicates[literal.predicate].types
+        named = {binding.get(a, a) for a in literal.args}
+        bound_hands = [
+            binding[p] for p in binding if any(e.name == binding[p] and e.type == "hand" for e in entities)
+        ]
+        choices: list[list[str]] = []
+        for arg, type_ in zip(literal.args, types, strict=True):
+            if arg == ALL:
+                choices.append([e.name for e in entities if self.is_a(e.type, type_) and e.name not in named])
+            elif arg == OTHERHAND:
+                choices.append([e.name for e in entities if e.type == "hand" and e.name not in bound_hands])
+            else:
+                choices.append([binding.get(arg, arg)])
+        for args in itertools.product(*choices):
+            yield Literal(Atom(literal.predicate, args), literal.positive)
+
+
+def _unique(literals: Iterator[Literal]) -> tuple[Literal, ...]:
+    return tuple(dict.fromkeys(literals))

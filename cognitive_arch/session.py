@@ -1,0 +1,219 @@
+"""From a sentence to a finished, logged episode: the parts put together."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cognitive_arch.domain import Domain, Scene, load_domain, load_scene
+from cognitive_arch.errors import ConfigError, unknown
+from cognitive_arch.evaluation.metrics import speed
+from cognitive_arch.execution.backends import BACKENDS, make_environment
+from cognitive_arch.execution.cycle import CycleSettings, EpisodeResult, PlanningCycle, Step
+from cognitive_arch.execution.environment import Environment
+from cognitive_arch.execution.heuristics import Heuristics
+from cognitive_arch.execution.noise import NoiseLevels
+from cognitive_arch.language.goals import GoalCompiler
+from cognitive_arch.language.instruction import parse_instruction
+from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
+from cognitive_arch.planning.base import Planner, make_planner
+from cognitive_arch.relational.parser import load_rules
+from cognitive_arch.relational.rules import Entity, RuleSet
+from cognitive_arch.relational.symbols import Goal, GroundAction
+from cognitive_arch.runlog.records import action_record, result_record, versions
+from cognitive_arch.runlog.store import RunStore
+from cognitive_arch.world.anchoring import WorldModel
+from cognitive_arch.world.observation import HANDS
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """An instruction worked out: what to do in words, and what has to be true after each part."""
+
+    instruction: str
+    semantic: tuple[SemanticInstruction, ...]
+    goals: tuple[Goal, ...]
+    alternatives: tuple[tuple[Goal, ...], ...] = ()
+
+    def to_json(self) -> dict[str, Any]:
+        """The fields of `parse --json`."""
+        subgoals = [[str(lit) for lit in goal] for goal in self.goals]
+        return {
+            "instruction": self.instruction,
+            "semantic": [list(triple) for triple in self.semantic],
+            "subgoals": subgoals,
+            "goal": subgoals[-1],
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """Where a task is to be done: the scene, what is known of its domain, and the rules."""
+
+    scene: Scene
+    domain: Domain
+    rules: RuleSet
+
+    @classmethod
+    def load(cls, scene: str, rules: str | None = None) -> Setting:
+        """Read scene, domain and rules; `rules` is a file that replaces the domain's own."""
+        loaded = load_scene(scene)
+        domain = load_domain(loaded.domain)
+        return cls(loaded, domain, load_rules(Path(rules) if rules else domain.rules_path))
+
+    def understand(self, sentence: str, held: Mapping[str, str] | None = None) -> Task:
+        """Sentence -> semantic instructions -> sub-goals, given the objects of the scene.
+
+        `held` maps an object to the hand that holds it. Raises `InstructionError`.
+        """
+        names = sorted(self.scene.objects)
+        entities = [Entity(hand, "hand") for hand in HANDS]
+        entities += [Entity(name, self.domain.objects[name].kind) for name in names]
+        instruction = parse_instruction(sentence, self.domain, names)
+        semantic = SemanticMemory(self.domain).expand(instruction, names, held or {})
+        compiler = GoalCompiler(self.rules)
+        goals = compiler.compile(semantic, entities, held)
+        return Task(instruction.sentence, semantic, goals, compiler.alternatives(semantic, entities, held))
+
+
+@dataclass(frozen=True, slots=True)
+class RunConfig:
+    """How to run a task; the defaults are those of the command line."""
+
+    scene: str = "simple"
+    backend: str = "drake"
+    noise: NoiseLevels = NoiseLevels()
+    heuristics: Heuristics = Heuristics()
+    planner: str = "a-prada"
+    seed: int = 0
+    jitter: float = 0.0
+    rules: str | None = None
+    record: bool = True
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ConfigError(f"seed {self.seed} is negative; valid: 0 or more")
+        if not 0 <= self.jitter <= 0.05:
+            raise ConfigError(f"jitter {self.jitter:g} m is out of range; valid: 0 to 0.05")
+        if self.backend not in BACKENDS:
+            raise ConfigError(unknown("backend", self.backend, BACKENDS))
+        make_planner(self.planner)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data for the manifest."""
+        return asdict(self) | {"noise": str(self.noise), "heuristics": str(self.heuristics)}
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """What a caller may want to hear while an episode goes on."""
+
+    on_task: Callable[[Task], None] = lambda task: None
+    on_act: Callable[[GroundAction], None] = lambda action: None
+    on_step: Callable[[Step], None] = lambda step: None
+
+
+class Session:
+    """One robot in one world, given one instruction after another.
+
+    The world model lasts from one instruction to the next, and so does what the hands hold.
+    """
+
+    def __init__(self, config: RunConfig, setting: Setting, environment: Environment) -> None:
+        self._setting = setting
+        self._environment = environment
+        self._heuristics = config.heuristics
+        self._planner: Planner = make_planner(config.planner)
+        # The environment draws from `seed` itself, the planner from a stream of its own.
+        self._rng = np.random.default_rng(np.random.SeedSequence(config.seed).spawn(1)[0])
+        self._world = WorldModel()
+        self._observation = environment.reset(config.seed)
+        self._world.update(self._observation)
+
+    @property
+    def world(self) -> WorldModel:
+        return self._world
+
+    def understand(self, sentence: str) -> Task:
+        """The sentence as a task, given what is in the hands now."""
+        return self._setting.understand(sentence, self._world.state.held)
+
+    def perform(
+        self, task: Task, progress: Progress = Progress(), settings: CycleSettings = CycleSettings()  # noqa: B008
+    ) -> EpisodeResult:
+        """Do `task`; returns when its goal holds or nothing is left to try."""
+        self._world.begin_instruction()
+        cycle = PlanningCycle(
+            self._environment,
+            self._world,
+            self._planner,
+            self._setting.rules,
+            self._rng,
+            heuristics=self._heuristics,
+            settings=settings,
+            on_act=progress.on_act,
+            on_step=progress.on_step,
+        )
+        return cycle.run(task.goals, self._environment.observe(), task.alternatives)
+
+
+def run_task(
+    sentence: str, config: RunConfig, store_folder: Path, progress: Progress = Progress()  # noqa: B008
+) -> dict[str, Any]:
+    """Run one sentence from start to end and keep it in the store; returns the fields of `run --json`.
+
+    Raises a `CogArchError` for anything wrong with the input, before anything is written.
+    """
+    started = time.perf_counter()
+    setting = Setting.load(config.scene, config.rules)
+    task = setting.understand(sentence)
+    progress.on_task(task)
+    manifest = {"instruction": task.instruction, **config.to_json(), **task.to_json(), "versions": versions()}
+    with RunStore(store_folder, create=True) as store:
+        environment = make_environment(
+            config.backend,
+            setting.domain,
+            setting.scene,
+            setting.rules,
+            noise=config.noise,
+            jitter=config.jitter,
+            record=config.record,
+        )
+        try:
+            with store.begin(f"{setting.scene.name}-{config.backend}-{config.seed}", manifest) as run:
+                actions: list[dict[str, Any]] = []
+
+                def on_step(step: Step) -> None:
+                    record = run.add_step(step)
+                    if step.action is not None:
+                        actions.append(action_record(record))
+                    progress.on_step(step)
+
+                session = Session(config, setting, environment)
+                result = session.perform(task, Progress(on_act=progress.on_act, on_step=on_step))
+                artifacts = [str(run.folder / name) for name in environment.save_artifacts(run.folder)]
+                outcome = result_record(result, speed(result.total))
+                outcome["wall_s"] = round(time.perf_counter() - started, 3)
+                run.finish(outcome | {"artifacts": artifacts})
+        finally:
+            environment.close()
+    return {
+        "run_id": run.run_id,
+        "instruction": task.instruction,
+        "scene": setting.scene.name,
+        "backend": config.backend,
+        "seed": config.seed,
+        "planner": config.planner,
+        "heuristics": str(config.heuristics),
+        "noise": str(config.noise),
+        **outcome,
+        "subgoals": task.to_json()["subgoals"],
+        "actions": actions,
+        "artifacts": artifacts,
+        "store": str(store_folder),
+    }
