@@ -1,0 +1,323 @@
+"""From clauses to commands: who does what to what, given what was said before."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+from cognitive_arch.domain import Domain
+from cognitive_arch.errors import InstructionError
+from cognitive_arch.language.clauses import ANY_HAND, OTHER_HAND, Clause, Mention
+from cognitive_arch.language.commands import (
+    LEFT,
+    RIGHT,
+    Command,
+    Drop,
+    Grasp,
+    Make,
+    Pull,
+    Push,
+    Put,
+    Semantic,
+)
+from cognitive_arch.language.recipes import Order
+from cognitive_arch.language.references import References
+from cognitive_arch.language.vocabulary import Vocabulary
+
+_REFUSED = {
+    "COUNT": "there is one of each thing and one is moved at a time: '{}' is more than I can do",
+    "BESIDE": "I can only put things on things, not '{}' them",
+    "SIDEWAYS": "I can pull things closer and push them away, but not '{}'",
+}
+_TRIPLE_VERBS = {
+    "GRASP": "grasp",
+    "HOLD": "grasp",
+    "GET": "grasp",
+    "PUT": "put",
+    "DROP": "drop",
+    "PULL": "pull",
+    "PUSH": "push",
+}
+_TAKING = frozenset({"GET", "GIVE", "GRASP", "HOLD", "MAKE"})
+
+
+class Interpreter:
+    """Reads the clauses of one instruction in order; carries over what later ones leave out."""
+
+    def __init__(self, vocabulary: Vocabulary, domain: Domain, scene_objects: Sequence[str]) -> None:
+        self._refs = References(vocabulary, domain, scene_objects)
+        self._domain = domain
+        self._recipes = vocabulary.recipes
+        self._done: list[Command] = []
+        self._order: Order | None = None
+        self._verb = ""
+        self._last_hand: str | None = None
+
+    def commands(self, clauses: Sequence[Clause]) -> tuple[Command, ...]:
+        """The commands of an instruction; raises `InstructionError` where a clause makes no sense."""
+        if any(clause.verb == "REACH" for clause in clauses):
+            return (Semantic(tuple(self._triple(clause) for clause in clauses)),)
+        means: Clause | None = None
+        for clause in clauses:
+            if clause.only_means and clause is not clauses[-1]:
+                means = clause
+                continue
+            if clause.only_means:
+                self._add_means(clause)
+                continue
+            if means is not None:
+                clause.hand = clause.hand or means.hand
+                clause.using = clause.using or means.using
+                means = None
+            self._read(clause)
+        self._close_order()
+        if not self._done:
+            raise InstructionError("nothing was asked for")
+        return tuple(self._done)
+
+    # ---- one clause --------------------------------------------------------------------------------
+
+    def _read(self, clause: Clause) -> None:
+        if self._order is not None and self._order.takes(clause):
+            return
+        for mark, message in _REFUSED.items():
+            if mark in clause.marks:
+                raise InstructionError(message.format(clause.marks[mark]))
+        if "NOT" in clause.marks:
+            raise InstructionError(f"I was told not to '{clause.verb_text or clause.marks['NOT']}': say what to do instead")
+        verb = clause.verb or self._elliptic_verb(clause)
+        if clause.recipe and (verb in _TAKING or verb == "PUT"):
+            verb = "MAKE"
+        elif verb == "MAKE" and not clause.recipe:
+            verb = self._without_recipe(clause)
+        if verb == "MAKE":
+            self._close_order()
+            self._order = Order.begin(clause, self._recipes, self._domain, self._refs)
+        else:
+            self._close_order()
+            self._handler(self._meaning(verb, clause), clause)(clause)
+        self._verb = verb
+
+    def _elliptic_verb(self, clause: Clause) -> str:
+        if clause.recipe:
+            return "MAKE"
+        if not clause.things and not clause.onto and not clause.using:
+            raise InstructionError("I do not know what to do")
+        # "put ham on the bun and the top bun on it" repeats the verb; "the rake the ham closer" has none.
+        if clause.onto or clause.between or "ATOP" in clause.marks:
+            return "PUT"
+        if "CLOSER" in clause.marks:
+            return "PULL"
+        if "AWAY" in clause.marks:
+            return "PUSH"
+        if self._verb and self._verb != "MAKE":
+            return self._verb
+        said = clause.things[0].text if clause.things else clause.using[0].text
+        raise InstructionError(f"I do not know what to do with '{said}'")
+
+    def _without_recipe(self, clause: Clause) -> str:
+        """ "I want ham and cheese" orders the one recipe they belong to; "I want the rake" takes it."""
+        if clause.onto or clause.between:
+            return "PUT"
+        fitting = [r for r, entry in self._domain.recipes.items() if self._all_of(clause, entry.fillings)]
+        if len(fitting) == 1 and clause.verb_text not in ("need", "have"):
+            clause.recipe = next(text for text, name in self._recipes.items() if name == fitting[0])
+            return "MAKE"
+        if clause.things and all(m.kind in ("OBJECT", "TOOL") for m in clause.things):
+            said = clause.things[0].text
+            raise InstructionError(f"I cannot '{clause.verb_text}' '{said}'")
+        raise InstructionError(f"I do not know what to '{clause.verb_text or 'make'}'")
+
+    def _all_of(self, clause: Clause, fillings: Sequence[str]) -> bool:
+        said = clause.things + clause.using
+        named = [set(self._refs.candidates(m)) for m in said if m.kind in ("OBJECT", "TOOL")]
+        return bool(named) and len(named) == len(said) and all(n & set(fillings) for n in named)
+
+    def _meaning(self, verb: str, clause: Clause) -> str:
+        """The action a verb stands for, seen together with the small words beside it."""
+        marks = clause.marks
+        placed = clause.onto or clause.between or "ATOP" in marks
+        if verb in ("PUSH", "PULL") and ("CLOSER" if verb == "PUSH" else "AWAY") in marks:
+            raise InstructionError("I pull things closer and push them away, not the other way round")
+        if verb in ("GET", "MOVE", "GIVE", "GRASP", "PUT"):
+            if placed and verb != "GRASP":
+                return "PUT"
+            if "CLOSER" in marks or (verb in ("GET", "GIVE") and clause.using):
+                return "PULL"
+            if "AWAY" in marks and verb not in ("GET", "GIVE", "GRASP"):
+                return "PUSH"
+            if "UP" in marks or verb in ("GET", "GIVE"):
+                return "GRASP"
+            if verb == "MOVE":
+                raise InstructionError(f"I do not know where to '{clause.verb_text}' it: closer, away or onto what")
+            if verb == "PUT" and "ON_HAND" in marks:
+                return "GRASP"
+            if verb == "PUT" and "DOWN" in marks:
+                return "DROP"
+        if verb == "DROP" and placed and clause.things:
+            return "PUT"
+        return {"HOLD": "GRASP", "OPEN": "DROP"}.get(verb, verb)
+
+    def _handler(self, verb: str, clause: Clause) -> Callable[[Clause], None]:
+        handlers = {
+            "GRASP": self._grasp,
+            "PUT": self._put,
+            "COVER": self._cover,
+            "DROP": self._drop,
+            "PULL": self._pull,
+            "PUSH": self._push,
+        }
+        if verb not in handlers:
+            raise InstructionError(f"I cannot '{clause.verb_text}' anything")
+        return handlers[verb]
+
+    def _close_order(self) -> None:
+        if self._order is not None:
+            made = self._order.command()
+            self._done.append(made)
+            self._refs.stack_top = None
+            self._order = None
+
+    # ---- means -------------------------------------------------------------------------------------
+
+    def _hand(self, clause: Clause) -> str | None:
+        if clause.hand in ("", ANY_HAND):
+            return None
+        if clause.hand == OTHER_HAND:
+            if self._last_hand is None:
+                raise InstructionError("I do not know which hand is the other one; say left or right")
+            self._last_hand = LEFT if self._last_hand == RIGHT else RIGHT
+        else:
+            self._last_hand = clause.hand
+        return self._last_hand
+
+    def _add_means(self, clause: Clause) -> None:
+        """ "pull the ham, using the rake": the last command gets what comes after the comma."""
+        if self._order is not None and self._order.takes(clause):
+            return
+        self._close_order()
+        if not self._done or isinstance(self._done[-1], Make | Semantic):
+            raise InstructionError("I do not know what to do")
+        last = self._done[-1]
+        hand = self._hand(clause)
+        if hand is not None:
+            last = replace(last, hand=hand)
+        if clause.using:
+            if not isinstance(last, Pull | Push):
+                raise InstructionError("a tool is only used to pull or push")
+            last = replace(last, tool=self._refs.tool(clause.using[0]))
+        self._done[-1] = last
+
+    def _no_tool(self, clause: Clause, action: str) -> None:
+        if clause.using:
+            raise InstructionError(f"I {action} with a hand, not with '{clause.using[0].text}'")
+
+    def _objects(self, clause: Clause, action: str) -> list[str]:
+        names = self._refs.several(clause.things)
+        if not names:
+            raise InstructionError(f"I do not know what to {action}")
+        return names
+
+    # ---- actions -----------------------------------------------------------------------------------
+
+    def _grasp(self, clause: Clause) -> None:
+        self._no_tool(clause, "grasp")
+        names = self._objects(clause, "grasp")
+        hand = self._hand(clause)
+        self._done += [Grasp(name, hand) for name in names]
+        self._refs.acted_on(*names)
+
+    def _put(self, clause: Clause) -> None:
+        self._no_tool(clause, "put things down")
+        hand = self._hand(clause)
+        things, goal = clause.things, (*clause.onto, *clause.between)
+        if not things and clause.onto:
+            # "put on the top bun" lacks not the thing but the place.
+            things, goal = clause.onto, ()
+        if goal and goal[0].kind == "TABLE":
+            return self._drop(clause)
+        self._stack(things, goal[0] if goal else None, hand, clause)
+        if clause.between and len(clause.between) + len(self._refs.candidates(clause.between[0])) > 2:
+            lid = next((n for n in self._refs.scene if n in self._refs.lids), None)
+            if lid is not None:
+                self._place([lid], self._refs.stack_top or lid, hand)
+
+    def _stack(self, things: list[Mention], goal: Mention | None, hand: str | None, clause: Clause) -> None:
+        """Each thing on the one before it, the first on `goal` or on what was stacked last."""
+        if not things:
+            raise InstructionError(f"I do not know what to '{clause.verb_text or 'put'}'")
+        below = self._refs.stack_top
+        if goal is not None:
+            moving = [n for m in things if m.kind != "PRONOUN" for n in self._refs.candidates(m)]
+            sure = {n for n in moving if [*moving].count(n) == 1} if len(moving) == len(things) else set()
+            below = self._refs.target(goal, sure)
+        elif below is None:
+            if len(things) == 1:
+                raise InstructionError(f"I do not know where to put '{things[0].text}'")
+            below, things = self._refs.target(things[0]), things[1:]
+        names = self._refs.several(things, prefer=self._refs.lids, avoid={below})
+        if not names and things[0].kind == "PRONOUN":
+            self._done.append(Put(None, below, hand))
+            return
+        self._place(names, below, hand)
+
+    def _place(self, names: Sequence[str], below: str, hand: str | None) -> None:
+        for name in names:
+            if name == below:
+                raise InstructionError(f"I cannot put {name} on itself")
+            self._done.append(Put(name, below, hand))
+            below = name
+        self._refs.acted_on(*names)
+        self._refs.stack_top = below
+
+    def _cover(self, clause: Clause) -> None:
+        """ "top the ham with cheese"; without "with", the lid is meant ("close the sandwich")."""
+        goal = next(iter(clause.things + clause.onto), None)
+        things = clause.using
+        if not things:
+            lid = next((n for n in self._refs.scene if n in self._refs.lids), None)
+            if lid is None:
+                raise InstructionError(f"I do not know what to '{clause.verb_text}' it with")
+            below = self._refs.target(goal, {lid}) if goal else self._refs.stack_top
+            if below is None:
+                raise InstructionError(f"I do not know what to '{clause.verb_text}'")
+            return self._place([lid], below, self._hand(clause))
+        self._stack(things, goal, self._hand(clause), clause)
+
+    def _drop(self, clause: Clause) -> None:
+        hand = self._hand(clause)
+        names = self._refs.several(clause.things)
+        self._done += [Drop(name, hand) for name in names] or [Drop(None, hand)]
+        self._refs.acted_on(*names)
+
+    def _tool(self, clause: Clause, objects: list[str]) -> str | None:
+        if clause.using:
+            return self._refs.tool(clause.using[0])
+        if len(objects) > 1 and self._refs.is_tool(objects[0]) and len(clause.direct) > 1:
+            return objects.pop(0)  # "rake the ham closer"
+        return None
+
+    def _pull(self, clause: Clause) -> None:
+        names = self._objects(clause, "pull")
+        tool, hand = self._tool(clause, names), self._hand(clause)
+        self._done += [Pull(name, tool, hand) for name in names]
+        self._refs.acted_on(*names)
+
+    def _push(self, clause: Clause) -> None:
+        names = self._objects(clause, "push")
+        tool, hand = self._tool(clause, names), self._hand(clause)
+        self._done += [Push(name, tool, hand) for name in names]
+        self._refs.acted_on(*names)
+
+    # ---- the semantic form -------------------------------------------------------------------------
+
+    def _triple(self, clause: Clause) -> tuple[str, str, str]:
+        said = " ".join(m.text for m in clause.things)
+        if "NOT" in clause.marks or clause.using or clause.onto or not clause.direct:
+            raise InstructionError(f"'{clause.verb_text} {said}' does not fit among semantic instructions")
+        objects = [self._refs.named(m) for m in clause.direct]
+        if clause.verb == "REACH" and len(clause.subject) == len(objects) == 1:
+            return (self._refs.named(clause.subject[0]), "reach", objects[0])
+        if clause.verb not in _TRIPLE_VERBS or len(objects) != 1 or clause.subject:
+            raise InstructionError(f"'{clause.verb_text} {said}' does not fit among semantic instructions")
+        return (self._hand(clause) or "hand", _TRIPLE_VERBS[clause.verb], objects[0])

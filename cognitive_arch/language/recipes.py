@@ -1,0 +1,104 @@
+"""Ordering a recipe: what goes in, what stays out, over as many clauses as it takes to say it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from cognitive_arch.domain import Domain, Recipe
+from cognitive_arch.errors import InstructionError
+from cognitive_arch.language.clauses import Clause, Mention
+from cognitive_arch.language.commands import Make
+from cognitive_arch.language.references import References
+
+_MORE = frozenset({"", "PUT", "COVER", "MAKE", "GIVE", "GET"})
+
+
+@dataclass
+class Order:
+    """A recipe being ordered; later clauses may add to it ("..., but hold the cheese")."""
+
+    name: str
+    recipe: Recipe
+    refs: References
+    fillings: list[str] = field(default_factory=list)
+    without: list[str] = field(default_factory=list)
+
+    @classmethod
+    def begin(cls, clause: Clause, recipes: Mapping[str, str], domain: Domain, refs: References) -> Order:
+        """Start from the clause that names the recipe."""
+        name = recipes[clause.recipe]
+        order = cls(name, domain.recipes[name], refs)
+        for mark in ("NOT", "COUNT", "BESIDE", "SIDEWAYS", "CLOSER", "AWAY"):
+            if mark in clause.marks:
+                raise InstructionError(f"I cannot make a {clause.recipe} '{clause.marks[mark]}'")
+        order._add(clause)
+        return order
+
+    @property
+    def _parts(self) -> set[str]:
+        return {*self.recipe.base, *self.recipe.fillings, *self.recipe.lid}
+
+    def takes(self, clause: Clause) -> bool:
+        """Whether `clause` goes on about this order; if so it is taken in."""
+        said = clause.things + clause.using + clause.without + clause.between
+        if clause.recipe or not said and not clause.marks.keys() & {"OPENFACED"} or clause.hand:
+            return False
+        if any(m.kind == "PRONOUN" for m in clause.things) and clause.verb not in ("", "MAKE", "COVER"):
+            return False
+        if not all(self._belongs(m) for m in said) or any(m.kind in ("OBJECT", "TOOL") for m in clause.onto):
+            return False
+        refusal = "NOT" in clause.marks or clause.verb == "HOLD" or clause.verb_text == "remove"
+        if refusal or (clause.verb == "DROP" and clause.verb_text in ("drop", "get rid of")):
+            self._remove(clause.things + clause.using)
+            return True
+        if clause.verb not in _MORE or clause.marks.keys() & {"DOWN", "UP", "CLOSER", "AWAY", "COUNT", "BESIDE"}:
+            return False
+        self._add(clause)
+        return True
+
+    def command(self) -> Make:
+        """The order as it stands."""
+        return Make(self.name, tuple(self.fillings), tuple(self.without))
+
+    def _belongs(self, mention: Mention) -> bool:
+        if mention.kind in ("OBJECT", "TOOL"):
+            return bool(self._parts.intersection(self.refs.candidates(mention)))
+        return mention.kind != "TABLE"
+
+    def _add(self, clause: Clause) -> None:
+        for mention in clause.things + clause.using + clause.between:
+            self._fill(mention)
+        if "ONLY" in clause.marks and not self.fillings:
+            self.without += self.recipe.fillings  # "just bread"
+        self._remove(clause.without)
+        if "OPENFACED" in clause.marks:
+            self.without += self.recipe.lid
+
+    def _fill(self, mention: Mention) -> None:
+        if mention.kind == "EVERYTHING":
+            names: Sequence[str] = [n for n in self.recipe.fillings if n in self.refs.scene]
+        elif mention.kind == "NOTHING":
+            self.without += self.recipe.fillings
+            return
+        elif mention.kind == "PRONOUN":
+            names = [n for n in self.refs.pronoun(mention) if n in self.recipe.fillings]
+        else:
+            names = self._filling(mention)
+        self.fillings += [n for n in names if n not in self.fillings]
+
+    def _filling(self, mention: Mention) -> list[str]:
+        known = self.refs.candidates(mention)
+        if all(n in self.recipe.base or n in self.recipe.lid for n in known):
+            return []  # "with ham and bread": the bread is there anyway
+        if not self._belongs(mention):
+            valid = ", ".join(self.recipe.fillings)
+            raise InstructionError(f"{known[0]} does not go into a {self.name}; what does: {valid}")
+        return [self.refs.named(mention)]
+
+    def _remove(self, mentions: Sequence[Mention]) -> None:
+        for mention in mentions:
+            if mention.kind in ("NOTHING", "EVERYTHING"):
+                self.without += self.recipe.fillings
+            elif mention.kind in ("OBJECT", "TOOL"):
+                self.without += [n for n in self.refs.candidates(mention) if n not in self.without]

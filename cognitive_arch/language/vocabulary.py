@@ -1,0 +1,267 @@
+"""From a sentence to typed words: the lists in `grammar/instruction.lark` plus the names of a domain.
+
+A sentence is written in a normal form (lower case, no quotes, hyphens as spaces, base forms of plurals
+and verb forms, no articles) and cut from left to right into the longest phrases that are known. A word
+in no phrase is an error that names it: nothing is dropped that is not on the list of fillers.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+import unicodedata
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+from cognitive_arch.domain import Domain
+from cognitive_arch.errors import InstructionError, one_line
+
+Phrase = tuple[str, ...]
+
+NAMES = frozenset({"OBJECT", "TOOL", "PRONOUN", "TABLE", "EVERYTHING", "NOTHING"})
+_DOMAIN_KINDS = frozenset({"OBJECT", "TOOL", "RECIPE"})
+_UNCUTTABLE = _DOMAIN_KINDS | {"HAND"}
+_SILENT = frozenset({"DETERMINER", "FILLER"})
+_HARMLESS_SYMBOLS = re.compile(r"FACE|HEART|HAND|THUMB|SIGN|SPARKLE|ROBOT|SMIL|STAR|PARTY|FINGER|FITZPATRICK")
+
+
+@dataclass(frozen=True)
+class Word:
+    """A phrase of the sentence with the grammar's terminal it stands for."""
+
+    kind: str
+    text: str
+
+
+def _symbol(char: str) -> str:
+    """A pictogram by its Unicode name ("TOMATO"), so that it counts as a word; faces say nothing."""
+    name = unicodedata.name(char, "")
+    return " " if _HARMLESS_SYMBOLS.search(name) else f" {name.lower()} "
+
+
+def _spell(char: str) -> str:
+    category = unicodedata.category(char)
+    if char in "&+":
+        return " and "
+    if char in "'’‘`´":
+        return ""
+    if char in ".!?;\n…":
+        return " ; "
+    if char in ",:()[]/—–":
+        return " , "
+    if category == "So":
+        return _symbol(char)
+    # Marks belong to the letter before them; without them "jalapen~o" would fall into two words.
+    return char if category[0] in "LNM" else " "
+
+
+def normal_words(text: str) -> list[str]:
+    """Lower-case words and the separators "," and ";" of any text."""
+    # The casefold comes first and the composition last: both are needed for a form that is stable.
+    folded = unicodedata.normalize("NFKC", unicodedata.normalize("NFKC", text).casefold())
+    return "".join(_spell(c) for c in folded).split()
+
+
+def _lemmas(word: str) -> Iterator[str]:
+    """Base forms `word` may be a plural or verb form of: "grabbing" -> grabb, grab, grabbe."""
+    for ending in ("s", "es", "ing", "ed", "d"):
+        stem = word.removesuffix(ending)
+        if stem == word or len(stem) < 2:
+            continue
+        yield stem
+        if ending in ("ing", "ed"):
+            if stem[-1] == stem[-2]:
+                yield stem[:-1]
+            yield stem + "e"
+
+
+class Vocabulary:
+    """All phrases of a domain's language, and what the names among them can stand for.
+
+    `lists`: terminal -> its phrases, as in the grammar; `verbs`: the terminals that are verbs.
+    """
+
+    def __init__(self, lists: dict[str, Sequence[str]], verbs: frozenset[str], domain: Domain) -> None:
+        self.verbs = verbs
+        self._kinds: dict[Phrase, dict[str, None]] = {}
+        self._things: dict[Phrase, tuple[str, ...]] = {}
+        self.recipes: dict[str, str] = {}
+        self._silent_words: frozenset[str] = frozenset(lists["DETERMINER"])
+        for kind, phrases in lists.items():
+            for phrase in phrases:
+                self._kinds.setdefault(tuple(phrase.split()), {})[kind] = None
+        for name, spec in domain.objects.items():
+            for alias in (name, *spec.aliases):
+                self._add_thing(alias, name)
+        tools = {name for name, spec in domain.objects.items() if spec.kind == "tool"}
+        for phrase, names in self._things.items():
+            self._kinds.setdefault(phrase, {})["TOOL" if tools.issuperset(names) else "OBJECT"] = None
+        for recipe, entry in domain.recipes.items():
+            for alias in (recipe, *entry.aliases):
+                words = self._name_words(alias)
+                self._kinds.setdefault(words, {})["RECIPE"] = None
+                self.recipes[" ".join(words)] = recipe
+        self._words = {word for phrase in self._kinds for word in phrase}
+        self._longest = max(map(len, self._kinds))
+
+    def _name_words(self, alias: str) -> Phrase:
+        return tuple(w for w in normal_words(alias) if w not in self._silent_words)
+
+    def _add_thing(self, alias: str, name: str) -> None:
+        words = self._name_words(alias)
+        # "bunbottom" is how a name is said by somebody who writes it as one word.
+        for phrase in dict.fromkeys((words, ("".join(words),))):
+            self._things[phrase] = (*self._things.get(phrase, ()), name)
+
+    def things(self, text: str) -> tuple[str, ...]:
+        """Names of the domain's objects that `text` (of a `Word`) can stand for."""
+        return tuple(dict.fromkeys(self._things[tuple(text.split())]))
+
+    def words(self, sentence: str, offer: str) -> list[Word]:
+        """The sentence as typed words, fillers dropped; `offer` ends the message about an unknown one."""
+        plain = [self._base(word) for word in normal_words(sentence)]
+        spoken = [w for w in plain if w not in self._silent_words]
+        determined = [bool(i) and plain[i - 1] in self._silent_words for i, w in enumerate(plain)]
+        determined = [d for d, w in zip(determined, plain, strict=True) if w not in self._silent_words]
+        found: list[Word] = []
+        at = 0
+        while at < len(spoken):
+            phrase = self._longest_at(spoken, determined, at)
+            if phrase is None:
+                raise InstructionError(f"I do not know the word {self._quoted(spoken[at])}; {offer}")
+            kind = self._choose(phrase, found, determined[at])
+            if kind not in _SILENT:
+                found.append(Word(kind, " ".join(phrase)))
+            at += len(phrase)
+        return found
+
+    def _base(self, word: str) -> str:
+        if word in self._words:
+            return word
+        return next((lemma for lemma in _lemmas(word) if lemma in self._words), word)
+
+    def _longest_at(self, words: list[str], determined: list[bool], at: int) -> Phrase | None:
+        for length in range(min(self._longest, len(words) - at), 0, -1):
+            phrase = tuple(words[at : at + length])
+            # "on top bun" is on + top bun although "on top" is a phrase too: names are never cut.
+            if phrase not in self._kinds or self._cuts_a_name(words, at, at + length):
+                continue
+            # "top the bun" is not the top bun: inside a name an article only follows "of".
+            inside = range(at + 1, at + length)
+            apart = any(determined[i] and words[i - 1] != "of" for i in inside)
+            if not (apart and self._kinds[phrase].keys() & _DOMAIN_KINDS):
+                return phrase
+        return None
+
+    def _cuts_a_name(self, words: list[str], start: int, end: int) -> bool:
+        for inner in range(start + 1, end):
+            for stop in range(end + 1, min(len(words), inner + self._longest) + 1):
+                if not _UNCUTTABLE.isdisjoint(self._kinds.get(tuple(words[inner:stop]), ())):
+                    return True
+        return False
+
+    def _choose(self, phrase: Phrase, before: list[Word], determined: bool) -> str:
+        """Of two meanings, the verb where a command may begin ("stick it ...", but "with the stick")."""
+        kinds = self._kinds[phrase]
+        verb = next((k for k in kinds if k in self.verbs), None)
+        other = next((k for k in kinds if k not in self.verbs), None)
+        if verb is None or other is None:
+            return verb or other or ""
+        for word in reversed(before):
+            if word.kind in self.verbs or word.kind in ("RECIPE", "WITH", "ON", "FROM"):
+                return other
+            if word.kind in ("JOIN", "THEN", "BUT"):
+                break
+        return other if determined else verb
+
+    def _quoted(self, word: str) -> str:
+        telling = _DOMAIN_KINDS | self.verbs
+        names = {w for p, k in self._kinds.items() if telling & k.keys() for w in p if len(w) > 2}
+        near = difflib.get_close_matches(word[:60], sorted(names), n=1, cutoff=0.6)
+        return f"'{one_line(word, 40)}'" + (f" (did you mean '{near[0]}'?)" if near else "")
+
+
+def _ahead_is_command(words: Sequence[Word], at: int, verbs: frozenset[str]) -> bool:
+    for word in words[at:]:
+        if word.kind in ("JOIN", "THEN", "BUT"):
+            return False
+        if word.kind in verbs:
+            return True
+    return False
+
+
+def _repair(words: Iterable[Word], verbs: frozenset[str]) -> list[Word]:
+    """Settle the words whose part depends on the next one, so that the grammar needs no look-ahead."""
+    given = list(words)
+    done: list[Word] = []
+    for here, word in enumerate(given):
+        following = given[here + 1].kind if here + 1 < len(given) else ""
+        named = following in NAMES or following == "HAND"
+        kind = word.kind
+        if kind == "TO":
+            kind = "ON" if named or following == "RECIPE" else ""
+        elif kind == "FILLING":
+            kind = "NOTHING" if done and done[-1].kind == "WITHOUT" else ""
+        elif kind == "PRONOUN" and following in NAMES | {"RECIPE", "HAND"} and word.text not in ("it", "them"):
+            kind = ""  # "that ham"
+        elif kind == "BUT":
+            kind = "WITHOUT" if following in ("OBJECT", "TOOL") else "JOIN"
+        elif kind == "ON" and not named and following != "RECIPE":
+            kind = "ATOP"
+        elif (kind == "FROM" and not named) or (kind == "WITH" and following in verbs | {"WITH", "RECIPE"}):
+            kind = ""
+        elif kind == "ONLY":
+            # As a mark it stands beside the phrase it limits: "with just bread" -> just, with bread.
+            kind = ""
+            if following == "OBJECT":
+                done.insert(len(done) - (bool(done) and done[-1].kind == "WITH"), word)
+            elif following in ("", "JOIN", "THEN") and done and done[-1].kind == "OBJECT":
+                done.append(word)
+        elif kind == "WITHOUT" and following in verbs:
+            kind = "NOT"
+        if kind:
+            done.append(Word(kind, word.text))
+    return done
+
+
+def _joint(words: Sequence[Word], start: int, end: int, clause: Sequence[Word], verbs: frozenset[str]) -> str:
+    """What the run of connectors `words[start:end]` means: AND in a list, BREAK between clauses, or ""."""
+    if not clause or end == len(words):
+        return ""
+    strong = any(w.kind == "THEN" for w in words[start:end])
+    following = words[end].kind
+    spoken = any(w.kind in verbs for w in clause)
+    opens = following in verbs or following in ("HAND", "WITH", "NOT")
+    if (spoken or opens) and _ahead_is_command(words, end, verbs):
+        return "BREAK"
+    if following not in NAMES and following != "RECIPE":
+        return "BREAK" if strong and following in ("WITHOUT", "NOT") else ""
+    last = clause[-1].kind
+    marker = clause[-2].kind if len(clause) > 1 else ""
+    # "on the bun and ..." and "with the rake and ..." take one thing; what follows is a new clause.
+    ended = marker in ("ON", "FROM") or (last == "TOOL" and marker == "WITH")
+    return "AND" if last in NAMES and following in NAMES and not strong and not ended else "BREAK"
+
+
+def joined(words: Iterable[Word], verbs: frozenset[str]) -> list[Word]:
+    """The words with every run of connectors replaced by AND, BREAK or nothing."""
+    given = _repair(words, verbs)
+    done: list[Word] = []
+    clause: list[Word] = []
+    at = 0
+    while at < len(given):
+        end = at
+        while end < len(given) and given[end].kind in ("JOIN", "THEN"):
+            end += 1
+        if end == at:
+            clause.append(given[at])
+            done.append(given[at])
+            at += 1
+            continue
+        kind = _joint(given, at, end, clause, verbs)
+        if kind:
+            done.append(Word(kind, given[at].text))
+        if kind == "BREAK":
+            clause = []
+        at = end
+    return done
