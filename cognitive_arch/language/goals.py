@@ -12,11 +12,11 @@ from collections.abc import Mapping, Sequence
 from cognitive_arch.errors import InstructionError, unknown
 from cognitive_arch.language.semantic_memory import SemanticInstruction
 from cognitive_arch.relational.rules import Entity, GroundRule, NIDRule, RuleSet
-from cognitive_arch.relational.symbols import Goal
+from cognitive_arch.relational.symbols import Goal, Literal
 from cognitive_arch.world.observation import HANDS
 
 REACH = "reach"
-PLACES = frozenset({"on", "inHand"})
+PLACES = frozenset({"on", "inHand", "reachableWith"})
 
 
 class GoalCompiler:
@@ -143,16 +143,13 @@ def _accumulate(previous: Goal, effect: Goal) -> Goal:
     ("put the ham on the bun, then take the ham" must not demand both).
     """
     new = {literal.atom for literal in effect}
-    moved = {lit.atom.args[0] for lit in effect if lit.positive and lit.atom.predicate in PLACES}
-    return effect if not previous else (
-        tuple(
-            literal
-            for literal in previous
-            if literal.atom not in new
-            and not (literal.positive and literal.atom.predicate in PLACES and literal.atom.args[0] in moved)
-        )
-        + effect
-    )
+    moved = {lit.atom.args[0] for lit in effect if lit.positive and lit.atom.predicate in ("on", "inHand")}
+
+    def stays(literal: Literal) -> bool:
+        place = literal.positive and literal.atom.predicate in PLACES
+        return literal.atom not in new and not (place and literal.atom.args[0] in moved)
+
+    return tuple(filter(stays, previous)) + effect
 
 
 def _track(effect: Goal, in_hand: dict[str, str]) -> None:

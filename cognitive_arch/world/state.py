@@ -72,7 +72,8 @@ class WorldState:
         """The ground atoms that are true.
 
         `on` is transitive downward. A place some hand can reach counts as reachable with every other
-        object too, since a hand could bring it there (`ALL` in the rule for pull speaks of them).
+        object too, since a hand could bring it there (`ALL` in the rule for pull speaks of them). What a
+        hand holds is reachable with that hand only: nothing can be put on it, no tool can act on it.
         """
         if "atoms" not in self._cache:
             self._cache["atoms"] = frozenset(self._atoms())
@@ -89,8 +90,8 @@ class WorldState:
             if obj.in_hand:
                 atoms.append(Atom("inHand", (obj.name, obj.in_hand)))
             atoms.extend(Atom("on", (obj.name, below)) for below in obj.on_top_of)
-            reach = set(obj.reachable_with)
-            if reach & set(HANDS):
+            reach = {obj.in_hand} if obj.in_hand else set(obj.reachable_with)
+            if not obj.in_hand and reach & set(HANDS):
                 reach.update(names)
             atoms.extend(Atom("reachableWith", (obj.name, entity)) for entity in reach - {obj.name})
             atoms.extend(Atom("pullableWith", (obj.name, tool)) for tool in obj.pullable_with)

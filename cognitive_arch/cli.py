@@ -1,0 +1,167 @@
+"""The command line: arguments -> library calls, nothing else.
+
+Heavy imports stay inside the commands, so that `--help` is quick.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from cognitive_arch.errors import CogArchError, one_line
+
+app = typer.Typer(
+    name="cogarch",
+    no_args_is_help=True,
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    help="Give a simulated iCub a sentence, watch it plan and act, and see why it did each thing.",
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else there.")]
+SceneOption = Annotated[str, typer.Option("--scene", help="A scene's name, or the path of a scene file.")]
+RulesOption = Annotated[
+    str | None, typer.Option("--rules", help="A rules file to use instead of the domain's own.")
+]
+StoreOption = Annotated[
+    Path, typer.Option("--store", envvar="COGARCH_STORE", help="Folder where runs are kept.")
+]
+Sentence = Annotated[str, typer.Argument(help='What to do, for example "make a ham sandwich".')]
+
+
+@app.command()
+def parse(
+    sentence: Sentence, scene: SceneOption = "simple", rules: RulesOption = None, as_json: Json = False
+) -> None:
+    """Show what a sentence means: semantic instructions and sub-goals, without acting."""
+    from cognitive_arch import report
+    from cognitive_arch.session import Setting
+
+    task = Setting.load(scene, rules).understand(sentence)
+    _print(task.to_json(), report.task_text(task), as_json)
+
+
+@app.command()
+def run(
+    sentence: Sentence,
+    scene: SceneOption = "simple",
+    backend: Annotated[str, typer.Option(help="drake (physics) or symbolic (a coin).")] = "drake",
+    noise: Annotated[
+        str, typer.Option(help="Noise level: one number, or left=0.5,right=0.25,pull=0,push=0.")
+    ] = "0",
+    heuristics: Annotated[
+        str, typer.Option(help="all, none, or a list of adaptability,creativity,goal_maintenance.")
+    ] = "all",
+    planner: Annotated[str, typer.Option(help="a-prada or prada.")] = "a-prada",
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    jitter: Annotated[
+        float, typer.Option(help="Move the objects by up to this many metres, and turn them, at the start.")
+    ] = 0.0,
+    rules: RulesOption = None,
+    store: StoreOption = Path("runs"),
+    record: Annotated[
+        bool, typer.Option("--record/--no-record", help="Keep a Meshcat recording and pictures (drake).")
+    ] = True,
+    as_json: Json = False,
+) -> None:
+    """Do what a sentence asks for: look, plan, act, notice what went wrong, find another way."""
+    from cognitive_arch import report
+    from cognitive_arch.execution.heuristics import Heuristics
+    from cognitive_arch.execution.noise import NoiseLevels
+    from cognitive_arch.session import RunConfig, run_task
+
+    config = RunConfig(
+        scene=scene,
+        backend=backend,
+        noise=NoiseLevels.parse(noise),
+        heuristics=Heuristics.parse(heuristics),
+        planner=planner,
+        seed=seed,
+        jitter=jitter,
+        rules=rules,
+        record=record,
+    )
+    with report.LiveProgress(quiet=as_json) as live:
+        result = run_task(sentence, config, store, live.progress)
+    _print(result, report.result_text(result), as_json)
+    if not result["success"]:
+        raise typer.Exit(1)
+
+
+@app.command()
+def inspect(
+    run_id: Annotated[
+        str | None, typer.Argument(metavar="[RUN]", help="A run's id, the start of one, or 'latest'.")
+    ] = None,
+    step: Annotated[int | None, typer.Option(help="Show the world as it was when this step began.")] = None,
+    format_: Annotated[str, typer.Option("--format", help="text, or jsonl: one line per step.")] = "text",
+    store: StoreOption = Path("runs"),
+    as_json: Json = False,
+) -> None:
+    """List the runs; or show one: plans, actions, the world at any step, why each heuristic fired."""
+    from cognitive_arch import inspection
+
+    view = inspection.view(store, run_id, step, format_)
+    _print(view.data, view.text, as_json)
+
+
+def _print(data: dict[str, Any], text: str, as_json: bool) -> None:
+    print(json.dumps(data, sort_keys=False, allow_nan=False) if as_json else text)
+
+
+def main() -> None:
+    """Entry point of `cogarch`: exit code 0 done, 1 honestly failed, 2 bad input, 130 interrupted."""
+    sys.exit(_guarded())
+
+
+def _guarded() -> int:
+    command = typer.main.get_command(app)
+    try:
+        code = command.main(prog_name="cogarch", standalone_mode=False)
+        return code if isinstance(code, int) else 0
+    except CogArchError as error:
+        return _complain(str(error))
+    except (KeyboardInterrupt, EOFError):
+        print("interrupted; finished steps are kept, see: cogarch inspect", file=sys.stderr)
+        return 130
+    except BrokenPipeError:
+        # The reader of our output went away (cogarch inspect | head); nothing is wrong with the run.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except Exception as error:
+        message = _usage_message(error)
+        if message is None:
+            raise
+        return _complain(message)
+
+
+def _usage_message(error: Exception) -> str | None:
+    """One line for an error of the argument parser; None for anything else.
+
+    Recognised by what it offers, for typer carries that parser's classes under names that change.
+    """
+    if type(error).__name__ == "Abort":
+        return "aborted"
+    if not hasattr(error, "format_message"):
+        return None
+    message = one_line(error.format_message(), 400)
+    context = getattr(error, "ctx", None)
+    if "command" in message.lower() and context is not None and hasattr(context.command, "commands"):
+        message += f" valid: {', '.join(sorted(context.command.commands))}"
+    return f"{message} (see: {context.command_path if context else 'cogarch'} --help)"
+
+
+def _complain(message: str) -> int:
+    print(f"cogarch: {' '.join(message.split())}", file=sys.stderr)
+    return 2
+
+
+if __name__ == "__main__":
+    main()

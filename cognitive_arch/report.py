@@ -1,0 +1,97 @@
+"""How tasks, steps and results look on a terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from types import TracebackType
+from typing import Any
+
+from rich.console import Console
+from rich.markup import escape
+from rich.status import Status
+
+from cognitive_arch.execution.cycle import Step
+from cognitive_arch.relational.symbols import GroundAction
+from cognitive_arch.runlog.records import step_record
+from cognitive_arch.session import Progress, Task
+
+
+def task_text(task: Task) -> str:
+    """The task in words, goals numbered."""
+    lines = [f"instruction  {task.instruction}"]
+    lines.append("means        " + ", ".join(map(str, task.semantic)))
+    lines.extend(f"sub-goal {n}   {_joined(goal)}" for n, goal in enumerate(task.goals, 1))
+    return "\n".join(lines)
+
+
+def step_text(record: dict[str, Any]) -> str:
+    """One step record on a few lines: what fired and why, what was done, what changed."""
+    lines = [f"        {event['kind']}: {event['why']}" for event in record["events"]]
+    if record["action"]:
+        call = f"{record['action']}({','.join(record['args'])})"
+        reason = "" if record["outcome"] == "success" else f" ({record['reason']})"
+        lines.append(f"step {record['step']:<3}{call}  {record['outcome']}{reason}")
+        plan = record["plan"]
+        lines.append(
+            f"        for sub-goal {record['subgoal']['index']}: {', '.join(record['subgoal']['missing'])}; "
+            f"plan of {len(plan['actions'])}, probability {plan['goal_probability']:.2f}, "
+            f"value {plan['value']:.2f}, horizon {record['horizon']}"
+        )
+        change = [f"+{atom}" for atom in record["added"]] + [f"-{atom}" for atom in record["removed"]]
+        lines.append("        " + (" ".join(change) or "nothing changed"))
+    return "\n".join(lines)
+
+
+def result_text(result: dict[str, Any]) -> str:
+    """How the run ended and where it is kept."""
+    verdict = "done" if result["success"] else f"failed: {result['explanation']}"
+    lines = [
+        verdict,
+        f"{result['good']} of {result['total']} actions worked, speed {result['speed']:.2f}, {result['wall_s']:.1f} s",
+        f"kept as {result['run_id']} in {result['store']}; see: cogarch inspect {result['run_id']}",
+    ]
+    lines.extend(f"wrote {path}" for path in result["artifacts"])
+    return "\n".join(lines)
+
+
+def _joined(literals: Sequence[object]) -> str:
+    return ", ".join(map(str, literals))
+
+
+class LiveProgress:
+    """Tells on the terminal what is going on: to stderr when `quiet` leaves stdout to a program."""
+
+    def __init__(self, quiet: bool) -> None:
+        self._console = Console(stderr=quiet, highlight=False, soft_wrap=True)
+        self._status = Console(stderr=True).status("getting ready")
+        self.progress = Progress(on_task=self._task, on_act=self._act, on_step=self._step)
+
+    def __enter__(self) -> LiveProgress:
+        if self._animated:
+            self._status.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._status.stop()
+
+    @property
+    def _animated(self) -> bool:
+        return Console(stderr=True).is_terminal
+
+    @property
+    def status(self) -> Status:
+        return self._status
+
+    def _task(self, task: Task) -> None:
+        self._console.print(escape(task_text(task)))
+
+    def _act(self, action: GroundAction) -> None:
+        self._status.update(escape(f"{action} ..."))
+
+    def _step(self, step: Step) -> None:
+        text = step_text(step_record(step))
+        if text:
+            self._console.print(escape(text))
+        self._status.update("planning")
