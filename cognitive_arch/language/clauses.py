@@ -17,6 +17,7 @@ from cognitive_arch.language.commands import LEFT, RIGHT
 from cognitive_arch.language.vocabulary import Word
 from cognitive_arch.resources import grammar_text
 
+_HAND_MARKS = frozenset({"ON_HAND", "WITH_HAND", "FROM_HAND", "FROM"})
 ANY_HAND = "hand"
 OTHER_HAND = "other"
 
@@ -50,7 +51,7 @@ class Clause:
     without: list[Mention] = field(default_factory=list)
     recipe: str = ""
     hand: str = ""
-    leading_hand: bool = False
+    joint: str = ""
     marks: dict[str, str] = field(default_factory=dict)
 
     @property
@@ -62,7 +63,7 @@ class Clause:
     def only_means(self) -> bool:
         """Names a hand or tool and nothing else ("with your left hand, ...")."""
         said = self.verb or self.things or self.onto or self.between or self.without or self.recipe
-        return not said and not self.marks and bool(self.hand or self.using)
+        return not (said or self.marks.keys() - _HAND_MARKS) and bool(self.hand or self.using)
 
 
 class _Given(Lexer):
@@ -124,7 +125,6 @@ def _clause(tree: Tree[Token]) -> Clause:
         match part.data:
             case "verb" if token is not None:
                 clause.verb, clause.verb_text = token.type, str(token)
-                clause.leading_hand = bool(clause.hand)
                 clause.subject, clause.direct = clause.direct, []
             case "mark" if token is not None:
                 clause.marks[token.type] = str(token)
@@ -150,7 +150,7 @@ def _clause(tree: Tree[Token]) -> Clause:
 def clauses(words: Sequence[Word]) -> list[Clause]:
     """Parse joined words (see `vocabulary.joined`); raises `InstructionError` where they do not fit."""
     try:
-        tree = _parser().parse(list(words))  # type: ignore[arg-type]
+        tree = _parser().parse(list(words))
     except UnexpectedInput as error:
         token = getattr(error, "token", None)
         at = token.start_pos if token is not None and token.type != "$END" else None
@@ -160,4 +160,12 @@ def clauses(words: Sequence[Word]) -> list[Clause]:
             ) from None
         after = f" after '{words[at - 1].text}'" if at else ""
         raise InstructionError(f"I do not understand '{words[at].text}'{after}") from None
-    return [_clause(child) for child in tree.children if isinstance(child, Tree)]
+    found: list[Clause] = []
+    joint = ""
+    for child in tree.children:
+        if isinstance(child, Token):
+            joint = str(child)
+        else:
+            found.append(_clause(child))
+            found[-1].joint = joint
+    return found

@@ -55,7 +55,8 @@ def parse_instruction(sentence: str, domain: Domain, scene_objects: Sequence[str
     # Lark takes longer to import than all the rest; a program that never parses does not pay for it.
     from cognitive_arch.language.clauses import clauses, verb_kinds, word_lists
     from cognitive_arch.language.interpretation import Interpreter
-    from cognitive_arch.language.vocabulary import Vocabulary, joined
+    from cognitive_arch.language.joints import joined
+    from cognitive_arch.language.vocabulary import Vocabulary
 
     if len(sentence) > MAX_LENGTH:
         raise InstructionError(

@@ -20,15 +20,11 @@ from cognitive_arch.language.commands import (
     Put,
     Semantic,
 )
+from cognitive_arch.language.meaning import action_of, check_parts, with_lists_joined
 from cognitive_arch.language.recipes import Order
 from cognitive_arch.language.references import References
-from cognitive_arch.language.vocabulary import Vocabulary
+from cognitive_arch.language.vocabulary import Vocabulary, Word
 
-_REFUSED = {
-    "COUNT": "there is one of each thing and one is moved at a time: '{}' is more than I can do",
-    "BESIDE": "I can only put things on things, not '{}' them",
-    "SIDEWAYS": "I can pull things closer and push them away, but not '{}'",
-}
 _TRIPLE_VERBS = {
     "GRASP": "grasp",
     "HOLD": "grasp",
@@ -38,7 +34,7 @@ _TRIPLE_VERBS = {
     "PULL": "pull",
     "PUSH": "push",
 }
-_TAKING = frozenset({"GET", "GIVE", "GRASP", "HOLD", "MAKE"})
+_TAKING = frozenset({"GET", "GIVE", "GRASP", "HOLD", "MAKE", "WANT"})
 
 
 class Interpreter:
@@ -55,10 +51,13 @@ class Interpreter:
 
     def commands(self, clauses: Sequence[Clause]) -> tuple[Command, ...]:
         """The commands of an instruction; raises `InstructionError` where a clause makes no sense."""
-        if any(clause.verb == "REACH" for clause in clauses):
+        if any(clause.verb == "REACH" and clause.subject for clause in clauses):
             return (Semantic(tuple(self._triple(clause) for clause in clauses)),)
         means: Clause | None = None
-        for clause in clauses:
+        clauses = with_lists_joined(clauses)
+        for clause, after in zip(clauses, [*clauses[1:], None], strict=True):
+            if clause.only_means and self._order is not None and self._order.takes(clause):
+                continue
             if clause.only_means and clause is not clauses[-1]:
                 means = clause
                 continue
@@ -69,7 +68,8 @@ class Interpreter:
                 clause.hand = clause.hand or means.hand
                 clause.using = clause.using or means.using
                 means = None
-            self._read(clause)
+            if not self._is_topic(clause, after):
+                self._read(clause)
         self._close_order()
         if not self._done:
             raise InstructionError("nothing was asked for")
@@ -80,23 +80,32 @@ class Interpreter:
     def _read(self, clause: Clause) -> None:
         if self._order is not None and self._order.takes(clause):
             return
-        for mark, message in _REFUSED.items():
-            if mark in clause.marks:
-                raise InstructionError(message.format(clause.marks[mark]))
         if "NOT" in clause.marks:
-            raise InstructionError(f"I was told not to '{clause.verb_text or clause.marks['NOT']}': say what to do instead")
+            what = f"not to '{clause.verb_text}'" if clause.verb_text else "what not to do"
+            raise InstructionError(f"I was told {what}; say what to do instead")
         verb = clause.verb or self._elliptic_verb(clause)
         if clause.recipe and (verb in _TAKING or verb == "PUT"):
             verb = "MAKE"
-        elif verb == "MAKE" and not clause.recipe:
+        elif verb in ("MAKE", "WANT") and not clause.recipe:
             verb = self._without_recipe(clause)
         if verb == "MAKE":
             self._close_order()
             self._order = Order.begin(clause, self._recipes, self._domain, self._refs)
         else:
             self._close_order()
-            self._handler(self._meaning(verb, clause), clause)(clause)
+            meaning = action_of(verb, clause)
+            check_parts(meaning, clause)
+            self._handler(meaning, clause)(clause)
         self._verb = verb
+
+    def _is_topic(self, clause: Clause, after: Clause | None) -> bool:
+        """ "the ham is too far, pull it closer": the first clause only says what "it" is."""
+        if clause.verb or clause.recipe or clause.onto or after is None or not clause.things:
+            return False
+        if not any(m.kind == "PRONOUN" for m in after.things) or clause.marks.keys() - {"AWAY"}:
+            return False
+        self._refs.acted_on(*self._refs.several(clause.things))
+        return True
 
     def _elliptic_verb(self, clause: Clause) -> str:
         if clause.recipe:
@@ -108,19 +117,31 @@ class Interpreter:
             return "PUT"
         if "CLOSER" in clause.marks:
             return "PULL"
-        if "AWAY" in clause.marks:
-            return "PUSH"
         if self._verb and self._verb != "MAKE":
             return self._verb
+        if len(clause.things) == 2 and clause.things[0].kind == "TOOL":
+            return "PULL"  # "hook the ham"
+        lowest = clause.things[0] if len(clause.things) > 1 else None
+        if (
+            lowest
+            and lowest.kind == "OBJECT"
+            and self._refs.bases.intersection(self._refs.candidates(lowest))
+        ):
+            return "PUT"  # "bottom bun, ham, top bun" builds it
         said = clause.things[0].text if clause.things else clause.using[0].text
         raise InstructionError(f"I do not know what to do with '{said}'")
 
     def _without_recipe(self, clause: Clause) -> str:
         """ "I want ham and cheese" orders the one recipe they belong to; "I want the rake" takes it."""
+        if clause.onto and clause.onto[0].text in self._recipes:
+            clause.recipe = clause.onto.pop(0).text  # "turn the ham into a sandwich"
+            return "MAKE"
         if clause.onto or clause.between:
             return "PUT"
         fitting = [r for r, entry in self._domain.recipes.items() if self._all_of(clause, entry.fillings)]
-        if len(fitting) == 1 and clause.verb_text not in ("need", "have"):
+        # "cook the ham" is beyond the robot; "combine ham and cheese" is not.
+        enough = clause.verb == "WANT" or len(clause.things + clause.using) > 1
+        if len(fitting) == 1 and enough:
             clause.recipe = next(text for text, name in self._recipes.items() if name == fitting[0])
             return "MAKE"
         if clause.things and all(m.kind in ("OBJECT", "TOOL") for m in clause.things):
@@ -132,31 +153,6 @@ class Interpreter:
         said = clause.things + clause.using
         named = [set(self._refs.candidates(m)) for m in said if m.kind in ("OBJECT", "TOOL")]
         return bool(named) and len(named) == len(said) and all(n & set(fillings) for n in named)
-
-    def _meaning(self, verb: str, clause: Clause) -> str:
-        """The action a verb stands for, seen together with the small words beside it."""
-        marks = clause.marks
-        placed = clause.onto or clause.between or "ATOP" in marks
-        if verb in ("PUSH", "PULL") and ("CLOSER" if verb == "PUSH" else "AWAY") in marks:
-            raise InstructionError("I pull things closer and push them away, not the other way round")
-        if verb in ("GET", "MOVE", "GIVE", "GRASP", "PUT"):
-            if placed and verb != "GRASP":
-                return "PUT"
-            if "CLOSER" in marks or (verb in ("GET", "GIVE") and clause.using):
-                return "PULL"
-            if "AWAY" in marks and verb not in ("GET", "GIVE", "GRASP"):
-                return "PUSH"
-            if "UP" in marks or verb in ("GET", "GIVE"):
-                return "GRASP"
-            if verb == "MOVE":
-                raise InstructionError(f"I do not know where to '{clause.verb_text}' it: closer, away or onto what")
-            if verb == "PUT" and "ON_HAND" in marks:
-                return "GRASP"
-            if verb == "PUT" and "DOWN" in marks:
-                return "DROP"
-        if verb == "DROP" and placed and clause.things:
-            return "PUT"
-        return {"HOLD": "GRASP", "OPEN": "DROP"}.get(verb, verb)
 
     def _handler(self, verb: str, clause: Clause) -> Callable[[Clause], None]:
         handlers = {
@@ -193,8 +189,6 @@ class Interpreter:
 
     def _add_means(self, clause: Clause) -> None:
         """ "pull the ham, using the rake": the last command gets what comes after the comma."""
-        if self._order is not None and self._order.takes(clause):
-            return
         self._close_order()
         if not self._done or isinstance(self._done[-1], Make | Semantic):
             raise InstructionError("I do not know what to do")
@@ -208,10 +202,6 @@ class Interpreter:
             last = replace(last, tool=self._refs.tool(clause.using[0]))
         self._done[-1] = last
 
-    def _no_tool(self, clause: Clause, action: str) -> None:
-        if clause.using:
-            raise InstructionError(f"I {action} with a hand, not with '{clause.using[0].text}'")
-
     def _objects(self, clause: Clause, action: str) -> list[str]:
         names = self._refs.several(clause.things)
         if not names:
@@ -221,19 +211,20 @@ class Interpreter:
     # ---- actions -----------------------------------------------------------------------------------
 
     def _grasp(self, clause: Clause) -> None:
-        self._no_tool(clause, "grasp")
         names = self._objects(clause, "grasp")
         hand = self._hand(clause)
         self._done += [Grasp(name, hand) for name in names]
         self._refs.acted_on(*names)
 
     def _put(self, clause: Clause) -> None:
-        self._no_tool(clause, "put things down")
         hand = self._hand(clause)
         things, goal = clause.things, (*clause.onto, *clause.between)
         if not things and clause.onto:
-            # "put on the top bun" lacks not the thing but the place.
-            things, goal = clause.onto, ()
+            # "put on the top bun" lacks not the thing but the place, unless one was just taken.
+            if self._done and isinstance(self._done[-1], Grasp):
+                things = [Mention((Word("PRONOUN", "it"),))]
+            else:
+                things, goal = clause.onto, ()
         if goal and goal[0].kind == "TABLE":
             return self._drop(clause)
         self._stack(things, goal[0] if goal else None, hand, clause)
@@ -293,7 +284,7 @@ class Interpreter:
     def _tool(self, clause: Clause, objects: list[str]) -> str | None:
         if clause.using:
             return self._refs.tool(clause.using[0])
-        if len(objects) > 1 and self._refs.is_tool(objects[0]) and len(clause.direct) > 1:
+        if not clause.verb and len(objects) > 1 and self._refs.is_tool(objects[0]):
             return objects.pop(0)  # "rake the ham closer"
         return None
 

@@ -11,7 +11,7 @@ from cognitive_arch.language.clauses import Clause, Mention
 from cognitive_arch.language.commands import Make
 from cognitive_arch.language.references import References
 
-_MORE = frozenset({"", "PUT", "COVER", "MAKE", "GIVE", "GET"})
+_MORE = frozenset({"", "WANT", "PUT", "COVER", "MAKE", "GIVE", "GET"})
 
 
 @dataclass
@@ -29,7 +29,7 @@ class Order:
         """Start from the clause that names the recipe."""
         name = recipes[clause.recipe]
         order = cls(name, domain.recipes[name], refs)
-        for mark in ("NOT", "COUNT", "BESIDE", "SIDEWAYS", "CLOSER", "AWAY"):
+        for mark in ("NOT", "CLOSER", "AWAY"):
             if mark in clause.marks:
                 raise InstructionError(f"I cannot make a {clause.recipe} '{clause.marks[mark]}'")
         order._add(clause)
@@ -42,17 +42,23 @@ class Order:
     def takes(self, clause: Clause) -> bool:
         """Whether `clause` goes on about this order; if so it is taken in."""
         said = clause.things + clause.using + clause.without + clause.between
-        if clause.recipe or not said and not clause.marks.keys() & {"OPENFACED"} or clause.hand:
+        if clause.recipe or (not said and not clause.marks.keys() & {"OPENFACED"}) or clause.hand:
             return False
-        if any(m.kind == "PRONOUN" for m in clause.things) and clause.verb not in ("", "MAKE", "COVER"):
+        if any(m.kind == "PRONOUN" for m in clause.things) and clause.verb not in (
+            "",
+            "MAKE",
+            "WANT",
+            "COVER",
+        ):
             return False
         if not all(self._belongs(m) for m in said) or any(m.kind in ("OBJECT", "TOOL") for m in clause.onto):
             return False
-        refusal = "NOT" in clause.marks or clause.verb == "HOLD" or clause.verb_text == "remove"
-        if refusal or (clause.verb == "DROP" and clause.verb_text in ("drop", "get rid of")):
+        # "a sandwich, hold the cheese" leaves it out; "make a sandwich, then hold the cheese" does not.
+        held_back = clause.verb == "HOLD" and set(clause.joint.split()) <= {",", ";", "and", "but"}
+        if "NOT" in clause.marks or held_back:
             self._remove(clause.things + clause.using)
             return True
-        if clause.verb not in _MORE or clause.marks.keys() & {"DOWN", "UP", "CLOSER", "AWAY", "COUNT", "BESIDE"}:
+        if clause.verb not in _MORE or clause.marks.keys() & {"DOWN", "UP", "CLOSER", "AWAY"}:
             return False
         self._add(clause)
         return True
@@ -67,7 +73,9 @@ class Order:
         return mention.kind != "TABLE"
 
     def _add(self, clause: Clause) -> None:
-        for mention in clause.things + clause.using + clause.between:
+        # "ham on top of tomato": what is below goes in first. The bread is below anyway.
+        below = [m for m in clause.onto if m.kind == "OBJECT"]
+        for mention in below + clause.things + clause.using + clause.between:
             self._fill(mention)
         if "ONLY" in clause.marks and not self.fillings:
             self.without += self.recipe.fillings  # "just bread"

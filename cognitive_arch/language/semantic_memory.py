@@ -8,6 +8,7 @@ what may fail is not its business.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from types import MappingProxyType
 from typing import NamedTuple
 
@@ -156,7 +157,7 @@ class _Expansion:
         recipe = self._domain.recipes[command.recipe]
         layers = self._layers(command, recipe)
         self._need(*layers)
-        for below, layer in zip(layers, layers[1:], strict=False):
+        for below, layer in pairwise(layers):
             self._put(layer, below, None)
 
     def _layers(self, command: Make, recipe: Recipe) -> list[str]:
@@ -168,7 +169,8 @@ class _Expansion:
         kept = [n for n in fillings if n not in command.without]
         if not kept and not command.without:
             raise InstructionError(
-                f"nothing of what goes into a {command.recipe} is here ({', '.join(recipe.default)}); {self.offer()}"
+                f"nothing of what goes into a {command.recipe} is here "
+                f"({', '.join(recipe.default)}); {self.offer()}"
             )
         lid = [n for n in recipe.lid if n not in command.without]
         return [*recipe.base, *kept, *lid]

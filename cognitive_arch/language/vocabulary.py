@@ -10,7 +10,7 @@ from __future__ import annotations
 import difflib
 import re
 import unicodedata
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from cognitive_arch.domain import Domain
@@ -22,6 +22,11 @@ NAMES = frozenset({"OBJECT", "TOOL", "PRONOUN", "TABLE", "EVERYTHING", "NOTHING"
 _DOMAIN_KINDS = frozenset({"OBJECT", "TOOL", "RECIPE"})
 _UNCUTTABLE = _DOMAIN_KINDS | {"HAND"}
 _SILENT = frozenset({"DETERMINER", "FILLER"})
+_REFUSED = {
+    "COUNT": "there is one of each thing and I move one at a time",
+    "BESIDE": "I can only put things on things",
+    "SIDEWAYS": "I can only pull things closer, push them away and put them on things",
+}
 _HARMLESS_SYMBOLS = re.compile(r"FACE|HEART|HAND|THUMB|SIGN|SPARKLE|ROBOT|SMIL|STAR|PARTY|FINGER|FITZPATRICK")
 
 
@@ -81,10 +86,11 @@ class Vocabulary:
     `lists`: terminal -> its phrases, as in the grammar; `verbs`: the terminals that are verbs.
     """
 
-    def __init__(self, lists: dict[str, Sequence[str]], verbs: frozenset[str], domain: Domain) -> None:
+    def __init__(self, lists: Mapping[str, Sequence[str]], verbs: frozenset[str], domain: Domain) -> None:
         self.verbs = verbs
         self._kinds: dict[Phrase, dict[str, None]] = {}
         self._things: dict[Phrase, tuple[str, ...]] = {}
+        self._run_together: set[str] = set()
         self.recipes: dict[str, str] = {}
         self._silent_words: frozenset[str] = frozenset(lists["DETERMINER"])
         for kind, phrases in lists.items():
@@ -94,8 +100,8 @@ class Vocabulary:
             for alias in (name, *spec.aliases):
                 self._add_thing(alias, name)
         tools = {name for name, spec in domain.objects.items() if spec.kind == "tool"}
-        for phrase, names in self._things.items():
-            self._kinds.setdefault(phrase, {})["TOOL" if tools.issuperset(names) else "OBJECT"] = None
+        for words, names in self._things.items():
+            self._kinds.setdefault(words, {})["TOOL" if tools.issuperset(names) else "OBJECT"] = None
         for recipe, entry in domain.recipes.items():
             for alias in (recipe, *entry.aliases):
                 words = self._name_words(alias)
@@ -110,6 +116,8 @@ class Vocabulary:
     def _add_thing(self, alias: str, name: str) -> None:
         words = self._name_words(alias)
         # "bunbottom" is how a name is said by somebody who writes it as one word.
+        if len(words) > 1:
+            self._run_together.add("".join(words))
         for phrase in dict.fromkeys((words, ("".join(words),))):
             self._things[phrase] = (*self._things.get(phrase, ()), name)
 
@@ -128,8 +136,15 @@ class Vocabulary:
         while at < len(spoken):
             phrase = self._longest_at(spoken, determined, at)
             if phrase is None:
-                raise InstructionError(f"I do not know the word {self._quoted(spoken[at])}; {offer}")
+                # A word known only inside longer phrases may still be a form of one that stands alone.
+                lemma = next((w for w in _lemmas(spoken[at]) if w in self._words), None)
+                if lemma is None:
+                    raise InstructionError(f"I do not know the word {self._quoted(spoken[at])}; {offer}")
+                spoken[at] = lemma
+                continue
             kind = self._choose(phrase, found, determined[at])
+            if kind in _REFUSED:
+                raise InstructionError(f"{_REFUSED[kind]}, not '{' '.join(phrase)}'; {offer}")
             if kind not in _SILENT:
                 found.append(Word(kind, " ".join(phrase)))
             at += len(phrase)
@@ -176,92 +191,9 @@ class Vocabulary:
 
     def _quoted(self, word: str) -> str:
         telling = _DOMAIN_KINDS | self.verbs
-        names = {w for p, k in self._kinds.items() if telling & k.keys() for w in p if len(w) > 2}
-        near = difflib.get_close_matches(word[:60], sorted(names), n=1, cutoff=0.6)
+        said = [
+            (p if _DOMAIN_KINDS & k.keys() else p[:1]) for p, k in self._kinds.items() if telling & k.keys()
+        ]
+        names = {w for p in said for w in p if len(w) > 2} - self._run_together
+        near = difflib.get_close_matches(word[:60], sorted(names - {word}), n=1, cutoff=0.6)
         return f"'{one_line(word, 40)}'" + (f" (did you mean '{near[0]}'?)" if near else "")
-
-
-def _ahead_is_command(words: Sequence[Word], at: int, verbs: frozenset[str]) -> bool:
-    for word in words[at:]:
-        if word.kind in ("JOIN", "THEN", "BUT"):
-            return False
-        if word.kind in verbs:
-            return True
-    return False
-
-
-def _repair(words: Iterable[Word], verbs: frozenset[str]) -> list[Word]:
-    """Settle the words whose part depends on the next one, so that the grammar needs no look-ahead."""
-    given = list(words)
-    done: list[Word] = []
-    for here, word in enumerate(given):
-        following = given[here + 1].kind if here + 1 < len(given) else ""
-        named = following in NAMES or following == "HAND"
-        kind = word.kind
-        if kind == "TO":
-            kind = "ON" if named or following == "RECIPE" else ""
-        elif kind == "FILLING":
-            kind = "NOTHING" if done and done[-1].kind == "WITHOUT" else ""
-        elif kind == "PRONOUN" and following in NAMES | {"RECIPE", "HAND"} and word.text not in ("it", "them"):
-            kind = ""  # "that ham"
-        elif kind == "BUT":
-            kind = "WITHOUT" if following in ("OBJECT", "TOOL") else "JOIN"
-        elif kind == "ON" and not named and following != "RECIPE":
-            kind = "ATOP"
-        elif (kind == "FROM" and not named) or (kind == "WITH" and following in verbs | {"WITH", "RECIPE"}):
-            kind = ""
-        elif kind == "ONLY":
-            # As a mark it stands beside the phrase it limits: "with just bread" -> just, with bread.
-            kind = ""
-            if following == "OBJECT":
-                done.insert(len(done) - (bool(done) and done[-1].kind == "WITH"), word)
-            elif following in ("", "JOIN", "THEN") and done and done[-1].kind == "OBJECT":
-                done.append(word)
-        elif kind == "WITHOUT" and following in verbs:
-            kind = "NOT"
-        if kind:
-            done.append(Word(kind, word.text))
-    return done
-
-
-def _joint(words: Sequence[Word], start: int, end: int, clause: Sequence[Word], verbs: frozenset[str]) -> str:
-    """What the run of connectors `words[start:end]` means: AND in a list, BREAK between clauses, or ""."""
-    if not clause or end == len(words):
-        return ""
-    strong = any(w.kind == "THEN" for w in words[start:end])
-    following = words[end].kind
-    spoken = any(w.kind in verbs for w in clause)
-    opens = following in verbs or following in ("HAND", "WITH", "NOT")
-    if (spoken or opens) and _ahead_is_command(words, end, verbs):
-        return "BREAK"
-    if following not in NAMES and following != "RECIPE":
-        return "BREAK" if strong and following in ("WITHOUT", "NOT") else ""
-    last = clause[-1].kind
-    marker = clause[-2].kind if len(clause) > 1 else ""
-    # "on the bun and ..." and "with the rake and ..." take one thing; what follows is a new clause.
-    ended = marker in ("ON", "FROM") or (last == "TOOL" and marker == "WITH")
-    return "AND" if last in NAMES and following in NAMES and not strong and not ended else "BREAK"
-
-
-def joined(words: Iterable[Word], verbs: frozenset[str]) -> list[Word]:
-    """The words with every run of connectors replaced by AND, BREAK or nothing."""
-    given = _repair(words, verbs)
-    done: list[Word] = []
-    clause: list[Word] = []
-    at = 0
-    while at < len(given):
-        end = at
-        while end < len(given) and given[end].kind in ("JOIN", "THEN"):
-            end += 1
-        if end == at:
-            clause.append(given[at])
-            done.append(given[at])
-            at += 1
-            continue
-        kind = _joint(given, at, end, clause, verbs)
-        if kind:
-            done.append(Word(kind, given[at].text))
-        if kind == "BREAK":
-            clause = []
-        at = end
-    return done
