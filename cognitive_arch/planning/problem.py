@@ -25,6 +25,7 @@ class Problem:
     `action_ptr[a]:action_ptr[a + 1]`.
     """
 
+    atoms: tuple[Atom, ...]
     actions: tuple[GroundAction, ...]
     action_ptr: Ints  # (n_actions + 1,)
     context_ptr: Ints  # (n_rules + 1,)
@@ -78,6 +79,7 @@ def compile_problem(state: State, goal: Goal, rules: Sequence[GroundRule]) -> Pr
     effects = [_effects(rule, index) for rule in ordered]
     goals = [(index[lit.atom], lit.positive) for lit in goal]
     return Problem(
+        atoms=tuple(atoms),
         actions=actions,
         action_ptr=_offsets(len(live[action]) for action in actions),
         context_ptr=_offsets(map(len, contexts)),
