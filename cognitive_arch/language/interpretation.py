@@ -75,8 +75,6 @@ class Interpreter:
             raise InstructionError("nothing was asked for")
         return tuple(self._done)
 
-    # ---- one clause --------------------------------------------------------------------------------
-
     def _read(self, clause: Clause) -> None:
         if self._order is not None and self._order.takes(clause):
             return
@@ -160,8 +158,8 @@ class Interpreter:
             "PUT": self._put,
             "COVER": self._cover,
             "DROP": self._drop,
-            "PULL": self._pull,
-            "PUSH": self._push,
+            "PULL": lambda said: self._move(said, Pull),
+            "PUSH": lambda said: self._move(said, Push),
         }
         if verb not in handlers:
             raise InstructionError(f"I cannot '{clause.verb_text}' anything")
@@ -169,12 +167,9 @@ class Interpreter:
 
     def _close_order(self) -> None:
         if self._order is not None:
-            made = self._order.command()
-            self._done.append(made)
+            self._done.append(self._order.command())
             self._refs.stack_top = None
             self._order = None
-
-    # ---- means -------------------------------------------------------------------------------------
 
     def _hand(self, clause: Clause) -> str | None:
         if clause.hand in ("", ANY_HAND):
@@ -207,8 +202,6 @@ class Interpreter:
         if not names:
             raise InstructionError(f"I do not know what to {action}")
         return names
-
-    # ---- actions -----------------------------------------------------------------------------------
 
     def _grasp(self, clause: Clause) -> None:
         names = self._objects(clause, "grasp")
@@ -288,19 +281,11 @@ class Interpreter:
             return objects.pop(0)  # "rake the ham closer"
         return None
 
-    def _pull(self, clause: Clause) -> None:
-        names = self._objects(clause, "pull")
+    def _move(self, clause: Clause, kind: type[Pull] | type[Push]) -> None:
+        names = self._objects(clause, kind.__name__.lower())
         tool, hand = self._tool(clause, names), self._hand(clause)
-        self._done += [Pull(name, tool, hand) for name in names]
+        self._done += [kind(name, tool, hand) for name in names]
         self._refs.acted_on(*names)
-
-    def _push(self, clause: Clause) -> None:
-        names = self._objects(clause, "push")
-        tool, hand = self._tool(clause, names), self._hand(clause)
-        self._done += [Push(name, tool, hand) for name in names]
-        self._refs.acted_on(*names)
-
-    # ---- the semantic form -------------------------------------------------------------------------
 
     def _triple(self, clause: Clause) -> tuple[str, str, str]:
         said = " ".join(m.text for m in clause.things)

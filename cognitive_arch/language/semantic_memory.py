@@ -164,7 +164,9 @@ class _Expansion:
         """From the bottom up. What is named must be there; a default only as far as it is."""
         left_out = [n for n in recipe.base if n in command.without]
         if left_out:
-            raise InstructionError(f"a {command.recipe} needs {left_out[0]}; it cannot go without")
+            raise InstructionError(
+                f"a {command.recipe} needs {left_out[0]}, it cannot go without; {self.offer()}"
+            )
         fillings = command.fillings or self._default(recipe)
         kept = [n for n in fillings if n not in command.without]
         if not kept and not command.without:

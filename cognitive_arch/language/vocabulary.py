@@ -122,8 +122,8 @@ class Vocabulary:
             self._things[phrase] = (*self._things.get(phrase, ()), name)
 
     def things(self, text: str) -> tuple[str, ...]:
-        """Names of the domain's objects that `text` (of a `Word`) can stand for."""
-        return tuple(dict.fromkeys(self._things[tuple(text.split())]))
+        """Names of the domain's objects that `text` (of a `Word`) can stand for; none for other words."""
+        return tuple(dict.fromkeys(self._things.get(tuple(text.split()), ())))
 
     def words(self, sentence: str, offer: str) -> list[Word]:
         """The sentence as typed words, fillers dropped; `offer` ends the message about an unknown one."""
@@ -142,7 +142,9 @@ class Vocabulary:
                     raise InstructionError(f"I do not know the word {self._quoted(spoken[at])}; {offer}")
                 spoken[at] = lemma
                 continue
-            kind = self._choose(phrase, found, determined[at])
+            after = self._kinds.get((spoken[at + len(phrase)],), {}) if at + len(phrase) < len(spoken) else {}
+            named = determined[at] or not self.verbs.isdisjoint(after)  # "stick reaches ham"
+            kind = self._choose(phrase, found, named)
             if kind in _REFUSED:
                 raise InstructionError(f"{_REFUSED[kind]}, not '{' '.join(phrase)}'; {offer}")
             if kind not in _SILENT:
@@ -175,7 +177,7 @@ class Vocabulary:
                     return True
         return False
 
-    def _choose(self, phrase: Phrase, before: list[Word], determined: bool) -> str:
+    def _choose(self, phrase: Phrase, before: list[Word], named: bool) -> str:
         """Of two meanings, the verb where a command may begin ("stick it ...", but "with the stick")."""
         kinds = self._kinds[phrase]
         verb = next((k for k in kinds if k in self.verbs), None)
@@ -187,7 +189,7 @@ class Vocabulary:
                 return other
             if word.kind in ("JOIN", "THEN", "BUT"):
                 break
-        return other if determined else verb
+        return other if named else verb
 
     def _quoted(self, word: str) -> str:
         telling = _DOMAIN_KINDS | self.verbs
