@@ -28,6 +28,7 @@ class FailureReason(StrEnum):
     UNKNOWN_OBJECT = "unknown_object"  # an argument is not in the world (any more)
     HAND_BUSY = "hand_busy"
     HAND_EMPTY = "hand_empty"
+    TOO_WIDE = "too_wide"  # the fingers do not open far enough
     COVERED = "covered"  # something lies on the object or the target
     OUT_OF_REACH = "out_of_reach"  # no arm posture reaches the place
     NOT_GRASPED = "not_grasped"  # the fingers closed, the object did not come along

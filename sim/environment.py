@@ -1,0 +1,105 @@
+"""The Drake environment: the `Environment` protocol on physics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+
+from cognitive_arch.domain import Domain, Scene, jittered
+from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
+from cognitive_arch.relational.symbols import GroundAction
+from cognitive_arch.world.observation import Observation
+from sim.pictures import Photographer
+from sim.robot import AimNoise, Robot
+from sim.scenario import FRICTION
+from sim.skills import SKILLS
+from sim.skills.base import unusable_arguments
+from sim.world import World
+
+SETTLE = 0.3  # s before the first look
+
+
+class DrakeEnvironment:
+    """A simulated iCub at a table; see `Environment`.
+
+    `noise` maps `left` and `right` to noise levels: an arm of level n misses its aim by a Gaussian of
+    n * 4 cm in x and y. `record` keeps a Meshcat recording and pictures for `save_artifacts`.
+    """
+
+    skills = frozenset(SKILLS)
+
+    def __init__(
+        self,
+        domain: Domain,
+        scene: Scene,
+        *,
+        noise: Mapping[str, float] | None = None,
+        jitter: float = 0.0,
+        record: bool = False,
+        friction: float = FRICTION,
+    ) -> None:
+        self._domain = domain
+        self._scene = scene
+        self._noise = AimNoise(dict(noise or {}))
+        self._jitter = jitter
+        self.world = World(domain, scene, record=record, friction=friction)
+        self._photographer = Photographer(self.world) if record else None
+        self._robot: Robot | None = None
+
+    @property
+    def robot(self) -> Robot:
+        """The robot of the current episode; raises `RuntimeError` before the first reset."""
+        if self._robot is None:
+            raise RuntimeError("reset the environment first")
+        return self._robot
+
+    def reset(self, seed: int) -> Observation:
+        """See `Environment.reset`."""
+        rng = np.random.default_rng(seed)
+        self.world.reset(jittered(self._scene, self._jitter, rng))
+        self._robot = Robot(self._domain, self._scene, self.world, self._noise, rng)
+        if self._photographer:
+            self._photographer.start()
+        self.world.hold(SETTLE)
+        if self._photographer:
+            self._photographer.take("start")
+        return self.observe()
+
+    def observe(self) -> Observation:
+        """See `Environment.observe`."""
+        return self.robot.perception.observe()
+
+    def execute(self, action: GroundAction) -> SkillResult:
+        """See `Environment.execute`."""
+        entry = SKILLS.get(action.name)
+        if entry is None:
+            return SkillResult(Outcome.FAILURE, FailureReason.UNKNOWN_SKILL)
+        wrong = unusable_arguments(self.robot, action, entry.n_objects)
+        if wrong is not None:
+            return SkillResult(Outcome.FAILURE, wrong)
+        started, name = self.world.time, action.args[0]
+        before = self.world.pose(name).translation()
+        reason = entry.perform(self.robot, action.args)
+        moved = self.world.pose(name).translation() - before
+        effect = {f"displacement_{axis}": float(d) for axis, d in zip("xyz", moved, strict=True)}
+        effect["duration"] = self.world.time - started
+        outcome = Outcome.SUCCESS if reason is FailureReason.NONE else Outcome.FAILURE
+        return SkillResult(outcome, reason, effect)
+
+    def settle(self, seconds: float) -> None:
+        """See `Environment.settle`."""
+        self.world.hold(seconds)
+
+    def save_artifacts(self, folder: Path) -> tuple[str, ...]:
+        """Write `start.png`, `end.png` and `recording.html` (with `record`); returns their names."""
+        if self._photographer is None:
+            return ()
+        self._photographer.take("end")
+        return self._photographer.save(folder)
+
+    def close(self) -> None:
+        """See `Environment.close`."""
+        self._robot = None
+        self._photographer = None

@@ -1,0 +1,178 @@
+"""Where the arms can go: inverse kinematics of torso and one arm, the other arm staying where it is."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.inverse_kinematics import InverseKinematics
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.solvers import SnoptSolver
+
+from cognitive_arch.world.observation import HANDS
+from sim.hands import FINGER_LENGTH, FINGER_OFFSET, PALM_SIGN, SIDES
+from sim.scenario import add_robot
+from sim.world import HOME, Joints
+
+Vector = NDArray[np.float64]
+TORSO_COST, ARM_COST = 2.0, 0.3  # moving the torso moves everything, so arms go first
+POSITION_TOLERANCE = 0.001  # m
+HAND_CLEARANCE = 0.06  # m that both wrists keep above the table
+RESTARTS = 3
+DOWN = np.array([0.0, 0.0, -1.0])
+
+
+@dataclass(frozen=True)
+class HandTarget:
+    """What a hand pose must satisfy.
+
+    The point `p_HP` of the hand frame (metres) is to be at `p_WP`; the hand's direction `axis_H` within
+    `tilt` radians of `axis_W`; and, if given, its y axis (along which the fingers close) within
+    `yaw_tolerance` of `fingers_W`.
+    """
+
+    p_HP: Vector
+    p_WP: Vector
+    axis_H: Vector
+    axis_W: Vector
+    tilt: float
+    fingers_W: Vector | None = None
+    yaw_tolerance: float = 0.08
+
+    def at(self, p_WP: Vector) -> HandTarget:
+        """The same demand at another place."""
+        return replace(self, p_WP=p_WP)
+
+
+def palm_axis(hand: str) -> Vector:
+    """The direction out of the palm, in the hand frame."""
+    return np.array([0.0, 0.0, PALM_SIGN[SIDES[hand]]])
+
+
+def fingertip(hand: str) -> Vector:
+    """The point between the two finger tips, in the hand frame, metres."""
+    return np.array([FINGER_OFFSET, 0.0, 0.0]) + FINGER_LENGTH * palm_axis(hand)
+
+
+class Kinematics:
+    """Solves for the joint vectors of a `World` whose joints are called `joint_names`."""
+
+    def __init__(self, joint_names: Sequence[str], table_height: float) -> None:
+        self.plant = MultibodyPlant(0.0)
+        add_robot(self.plant)
+        self.plant.Finalize()
+        self._context = self.plant.CreateDefaultContext()
+        self._index = np.array([self.plant.GetJointByName(name).position_start() for name in joint_names])
+        self._names = tuple(joint_names)
+        self._table_height = table_height
+        self._home = np.array([HOME.get(name, 0.0) for name in joint_names])
+        self._reach: dict[tuple[str, int, int], bool] = {}
+
+    def _full(self, joints: Joints) -> Vector:
+        full = np.zeros(self.plant.num_positions())
+        full[self._index] = joints
+        return full
+
+    def hand_pose(self, hand: str, joints: Joints) -> RigidTransform:
+        """X_WH at `joints`."""
+        self.plant.SetPositions(self._context, self._full(joints))
+        frame = self.plant.GetFrameByName(f"{SIDES[hand]}_hand_dh_frame")
+        return frame.CalcPoseInWorld(self._context)
+
+    def solve(
+        self, hand: str, target: HandTarget, near: Joints, restarts: int = RESTARTS
+    ) -> Joints | None:
+        """Joints close to `near` that meet `target`, or None. Fingers keep their position.
+
+        Restarts draw from a generator of their own, seeded by the attempt, so that the answer depends on
+        the arguments only.
+        """
+        start = self._full(near)
+        lower, upper = self.plant.GetPositionLowerLimits(), self.plant.GetPositionUpperLimits()
+        for attempt in range(restarts):
+            problem = self._problem(hand, target, start)
+            guess = start
+            if attempt:
+                shaken = start + np.random.default_rng(attempt).normal(0, 0.3, len(start))
+                guess = np.clip(shaken, lower, upper)
+            problem.get_mutable_prog().SetInitialGuess(problem.q(), guess)
+            result = SnoptSolver().Solve(problem.prog())
+            if result.is_success():
+                solution: Joints = result.GetSolution(problem.q())[self._index]
+                return self._with_fingers_of(near, solution)
+        return None
+
+    def _problem(self, hand: str, target: HandTarget, start: Vector) -> InverseKinematics:
+        problem = InverseKinematics(self.plant, True)
+        world = self.plant.world_frame()
+        frame = self.plant.GetFrameByName(f"{SIDES[hand]}_hand_dh_frame")
+        tolerance = np.full(3, POSITION_TOLERANCE)
+        problem.AddPositionConstraint(
+            frame, target.p_HP, world, target.p_WP - tolerance, target.p_WP + tolerance
+        )
+        problem.AddAngleBetweenVectorsConstraint(
+            frame, target.axis_H, world, target.axis_W, 0, target.tilt
+        )
+        if target.fingers_W is not None:
+            problem.AddAngleBetweenVectorsConstraint(
+                frame, np.array([0.0, 1.0, 0.0]), world, target.fingers_W, 0, target.yaw_tolerance
+            )
+        # A torso lean lowers the idle arm: its hand and both elbows stay clear of the table.
+        floor = self._table_height + HAND_CLEARANCE
+        for other in HANDS:
+            links = [f"{SIDES[other]}_forearm"] + ([f"{SIDES[other]}_hand_dh_frame"] if other != hand else [])
+            for link in links:
+                low, high = np.array([-2.0, -2.0, floor]), np.full(3, 2.0)
+                problem.AddPositionConstraint(
+                    self.plant.GetFrameByName(link), np.zeros(3), world, low, high
+                )
+        q, program = problem.q(), problem.get_mutable_prog()
+        idle = SIDES[next(h for h in HANDS if h != hand)]
+        for name, index in zip(self._names, self._index, strict=True):
+            if name.startswith(f"{idle}_") or "finger" in name:
+                program.AddBoundingBoxConstraint(start[index], start[index], q[index])
+        weights = np.zeros((len(start), len(start)))
+        for name, index in zip(self._names, self._index, strict=True):
+            weights[index, index] = TORSO_COST if "torso" in name else ARM_COST
+        program.AddQuadraticErrorCost(weights, start, q)
+        return problem
+
+    def _with_fingers_of(self, near: Joints, solution: Joints) -> Joints:
+        keep = ["finger" in name for name in self._names]
+        return np.where(keep, near, solution)
+
+    def line(self, hand: str, target: HandTarget, end: Vector, start: Joints, pieces: int = 4) -> list[Joints] | None:
+        """Waypoints of a straight line from `target.p_WP` (where the hand is at `start`) to `end`."""
+        path, joints = [], start
+        for fraction in np.linspace(0, 1, pieces + 1)[1:]:
+            place = target.p_WP + fraction * (end - target.p_WP)
+            step = self.solve(hand, target.at(place), joints, restarts=2)
+            if step is None:
+                return None
+            path.append(step)
+            joints = step
+        return path
+
+    def reaches(self, hand: str, x: float, y: float) -> bool:
+        """Whether `hand` can grasp something on the table at (x, y), metres; remembered per 5 mm."""
+        key = (hand, round(x / 0.005), round(y / 0.005))
+        if key not in self._reach:
+            place = np.array([key[1] * 0.005, key[2] * 0.005, self._table_height + 0.01])
+            target = HandTarget(fingertip(hand), place, palm_axis(hand), DOWN, tilt=0.30)
+            near = self._home
+            self._reach[key] = self.solve(hand, target, near) is not None
+        return self._reach[key]
+
+
+def finger_directions(yaws: Sequence[float]) -> list[Vector]:
+    """Unit vectors of the closing direction for hand yaws (radians), each both ways round."""
+    directions = []
+    for yaw in yaws:
+        direction = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
+        directions += [direction, -direction]
+    return directions
+
+

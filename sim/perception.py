@@ -1,0 +1,94 @@
+"""Oracle perception: an observation read from the simulator's poses and contacts, not from images."""
+
+from __future__ import annotations
+
+import math
+
+from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
+from sim.hands import SIDES, finger_names
+from sim.kinematics import Kinematics
+from sim.world import World
+
+TOOL_REACH = 0.25  # m that a held tool adds to an arm
+FALLEN = 0.05  # m below the table's top
+
+
+class OraclePerception:
+    """Looks at one world."""
+
+    def __init__(self, world: World, kinematics: Kinematics) -> None:
+        self._world = world
+        self._kinematics = kinematics
+
+    def observe(self) -> Observation:
+        """One look. What has fallen off the table is reported as absent from where it was."""
+        world = self._world
+        names = tuple(world.scenario.objects)
+        fallen = tuple(n for n in names if self._fallen(n))
+        hands = tuple(HandObservation(hand, self.held(hand)) for hand in HANDS)
+        objects = tuple(self._see(name) for name in names if name not in fallen)
+        return Observation(world.time, objects, hands, fallen)
+
+    def held(self, hand: str) -> str | None:
+        """What both fingers of `hand` press on and nothing else carries."""
+        contacts = self._world.contacts()
+        fingers = finger_names(SIDES[hand])
+        for name in self._world.scenario.objects:
+            touched = all((finger, name) in contacts for finger in fingers)
+            if touched and not self._carried(name, contacts):
+                return name
+        return None
+
+    def supports(self, name: str) -> tuple[str, ...]:
+        """The objects that `name` rests on: in contact, lower, and overlapping it sideways."""
+        contacts = self._world.contacts()
+        return tuple(o for o in self._world.scenario.objects if self._rests_on(name, o, contacts))
+
+    def covered_by(self, name: str) -> tuple[str, ...]:
+        """The objects that rest on `name`."""
+        contacts = self._world.contacts()
+        return tuple(o for o in self._world.scenario.objects if self._rests_on(o, name, contacts))
+
+    def _carried(self, name: str, contacts: frozenset[tuple[str, str]]) -> bool:
+        if ("table", name) in contacts:
+            return True
+        return any(self._rests_on(name, o, contacts) for o in self._world.scenario.objects)
+
+    def _rests_on(self, upper: str, lower: str, contacts: frozenset[tuple[str, str]]) -> bool:
+        if upper == lower or (upper, lower) not in contacts:
+            return False
+        p_WU, p_WL = (self._world.pose(n).translation() for n in (upper, lower))
+        sideways = math.hypot(p_WU[0] - p_WL[0], p_WU[1] - p_WL[1])
+        apart = (self._world.height(upper) + self._world.height(lower)) / 2
+        return bool(p_WU[2] - p_WL[2] > 0.6 * apart and sideways < self.radius(lower))
+
+    def radius(self, name: str) -> float:
+        """Half the smaller horizontal extent of an object, metres."""
+        shape = self._world.domain.objects[name].shape
+        if shape.type == "box":
+            return min(shape.size[:2]) / 2
+        return shape.width / 2 if shape.type == "tool" else shape.radius
+
+    def _fallen(self, name: str) -> bool:
+        return bool(self._world.pose(name).translation()[2] < self._world.scene.table.height - FALLEN)
+
+    def _see(self, name: str) -> ObjectObservation:
+        world = self._world
+        X_WO = world.pose(name)
+        x, y, z = (float(v) for v in X_WO.translation())
+        spec = world.domain.objects[name]
+        tools = [t for t in world.scenario.objects if world.domain.objects[t].kind == "tool" and t != name]
+        holder = next((hand for hand in HANDS if self.held(hand) == name), None)
+        hands = [hand for hand in HANDS if holder or self._kinematics.reaches(hand, x, y)]
+        distance = math.hypot(x, y)
+        nearer = (x * (1 - TOOL_REACH / distance), y * (1 - TOOL_REACH / distance))
+        by_tool = tools if hands or any(self._kinematics.reaches(h, *nearer) for h in HANDS) else []
+        return ObjectObservation(
+            name=name,
+            kind=spec.kind,
+            position=(x, y, z),
+            below=() if holder else self.supports(name),
+            reachable_with=(*hands, *by_tool),
+            pullable_with=() if hands else tuple(t for t in by_tool if world.domain.objects[t].can_pull),
+            yaw=float(X_WO.rotation().ToRollPitchYaw().yaw_angle()),
+        )

@@ -1,0 +1,108 @@
+"""What skills work with: the world, the arms' kinematics, perception, and where the arm believes it aims."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from cognitive_arch.domain import Domain, Scene
+from sim.kinematics import DOWN, HandTarget, Kinematics, Vector, finger_directions, fingertip, palm_axis
+from sim.perception import OraclePerception
+from sim.world import Joints, World
+
+APPROACH = 0.09  # m above its target that a hand comes down from
+LEVEL, TILTS = 0.03, (0.05, 0.15, 0.30)  # rad
+YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing direction
+TRANSIT_SPEED = 0.9  # rad/s of the fastest joint between poses
+
+
+@dataclass(frozen=True)
+class AimNoise:
+    """An arm's error of aim: Gaussian, independent in x and y, `scale` metres at noise level 1."""
+
+    levels: Mapping[str, float]
+    scale: float = 0.04
+
+    def __str__(self) -> str:
+        sigmas = ", ".join(f"{arm} {1000 * self.scale * v:.1f} mm" for arm, v in sorted(self.levels.items()))
+        return f"aim off by a Gaussian of {sigmas} in x and y"
+
+    def draw(self, hand: str, rng: np.random.Generator) -> Vector:
+        """One error, metres, (3,); draws nothing when the arm is perfect."""
+        level = self.levels.get("left" if hand == "LeftHand" else "right", 0.0)
+        if level <= 0:
+            return np.zeros(3)
+        return np.append(rng.normal(0.0, self.scale * level, 2), 0.0)
+
+
+@dataclass
+class Grip:
+    """How a hand holds its object: how far the fingers opened before, and the target they close to."""
+
+    opening: float
+    closed: float
+    yaws: tuple[float, ...]
+
+
+@dataclass
+class Robot:
+    """The iCub as skills see it. `grips` says how each full hand holds what it holds."""
+
+    domain: Domain
+    scene: Scene
+    world: World
+    noise: AimNoise
+    rng: np.random.Generator
+    grips: dict[str, Grip] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.kinematics = Kinematics(self.world.joint_names, self.scene.table.height)
+        self.perception = OraclePerception(self.world, self.kinematics)
+
+    def top_of(self, name: str) -> float:
+        """Height of an object's upper face, metres."""
+        return float(self.world.pose(name).translation()[2] + self.world.height(name) / 2)
+
+    def travel(self, joints: Joints, *more: Joints, seconds: float | None = None) -> None:
+        """Go to `joints` and on through `more`, as fast as the fastest joint may."""
+        if seconds is None:
+            stops = np.vstack([self.world.command, joints, *more])
+            seconds = max(0.6, float(np.abs(np.diff(stops, axis=0)).max(axis=1).sum()) / TRANSIT_SPEED * 1.9)
+        self.world.follow([joints, *more], seconds)
+
+    def above(self, hand: str, target: HandTarget) -> HandTarget:
+        """The place from which a hand comes down to `target`."""
+        return target.at(target.p_WP + np.array([0.0, 0.0, APPROACH]))
+
+    def descent(self, hand: str, target: HandTarget) -> tuple[Joints, list[Joints]] | None:
+        """Joints above `target` and the waypoints straight down to it, or None if out of reach."""
+        high = self.above(hand, target)
+        start = self.kinematics.solve(hand, high, self.rest(hand))
+        if start is None:
+            return None
+        path = self.kinematics.line(hand, high, target.p_WP, start)
+        return None if path is None else (start, path)
+
+    def rest(self, hand: str) -> Joints:
+        """The home posture for torso and `hand`, everything else as commanded now.
+
+        Inverse kinematics starts from here, so that postures do not wander off over many actions.
+        """
+        side = "l_" if hand == "LeftHand" else "r_"
+        moves = [n.startswith(("torso", side)) and "finger" not in n for n in self.world.joint_names]
+        return np.where(moves, self.world.home, self.world.command)
+
+    def go_home(self, hand: str) -> None:
+        """Back to the home posture with one arm, fingers as they are."""
+        self.travel(self.rest(hand))
+
+    def grasp_targets(self, hand: str, p_WP: Vector, yaws: tuple[float, ...]) -> list[HandTarget]:
+        """Ways to bring the finger tips of `hand` to `p_WP`, palm down, the most upright ones first."""
+        base = HandTarget(fingertip(hand), p_WP, palm_axis(hand), DOWN, tilt=TILTS[0])
+        return [
+            HandTarget(base.p_HP, p_WP, base.axis_H, DOWN, tilt, direction)
+            for tilt in TILTS
+            for direction in finger_directions(yaws)
+        ]

@@ -1,0 +1,30 @@
+"""What every skill is: a motion that reports why it could not be done, never that it worked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cognitive_arch.execution.environment import FailureReason
+from cognitive_arch.relational.symbols import GroundAction
+from cognitive_arch.world.observation import HANDS
+from sim.robot import Robot
+
+Skill = Callable[[Robot, tuple[str, ...]], FailureReason]
+"""Moves the robot; returns `NONE` if the motion was carried out, else what was in the way or went wrong.
+Whether it had the intended effect is for the observation afterwards to say."""
+
+
+def unusable_arguments(robot: Robot, action: GroundAction, n_objects: int) -> FailureReason | None:
+    """Why the arguments (objects, then one hand) cannot be worked with, if so."""
+    *objects, hand = action.args if action.args else ("",)
+    if len(action.args) != n_objects + 1 or hand not in HANDS or len(set(objects)) < len(objects):
+        return FailureReason.UNKNOWN_OBJECT
+    seen = {obj.name for obj in robot.perception.observe().objects}
+    return None if set(objects) <= seen else FailureReason.UNKNOWN_OBJECT
+
+
+def release(robot: Robot, hand: str, opening: float) -> None:
+    """Open the hand where it is and forget the grip."""
+    robot.world.move_fingers(hand, opening)
+    robot.world.hold(0.1)
+    robot.grips.pop(hand, None)

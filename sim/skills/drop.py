@@ -1,0 +1,41 @@
+"""dropWith(obj, hand): lay what the hand holds on a free place of the table, gently."""
+
+from __future__ import annotations
+
+import itertools
+import math
+
+import numpy as np
+
+from cognitive_arch.execution.environment import FailureReason
+from sim.robot import Robot
+from sim.skills.put import set_down
+
+CLEARANCE = 0.085  # m between the centres of what lies on the table
+PLACES = (np.arange(-0.24, -0.47, -0.04), np.arange(0.08, 0.30, 0.04))  # m, x and |y| to choose from
+
+
+def drop(robot: Robot, args: tuple[str, ...]) -> FailureReason:
+    """See `base.Skill`."""
+    name, hand = args
+    if robot.perception.held(hand) != name:
+        return FailureReason.HAND_EMPTY
+    height = robot.scene.table.height + robot.world.height(name) / 2
+    for x, y in free_places(robot, name, hand):
+        reason = set_down(robot, hand, np.array([x, y, height]))
+        if reason is not FailureReason.OUT_OF_REACH:
+            return reason
+    return FailureReason.OUT_OF_REACH
+
+
+def free_places(robot: Robot, name: str, hand: str) -> list[tuple[float, float]]:
+    """Free places on the hand's side of the table, within reach, the freest first."""
+    sign = -1.0 if hand == "LeftHand" else 1.0
+    others = [robot.world.pose(o).translation()[:2] for o in robot.world.scenario.objects if o != name]
+    places = []
+    for x, y in itertools.product(*PLACES):
+        place = (float(x), sign * float(y))
+        distance = min((math.dist(place, other) for other in others), default=1.0)
+        if distance >= CLEARANCE and robot.kinematics.reaches(hand, *place):
+            places.append((-min(distance, 0.14), abs(place[1]), place))
+    return [place for *_, place in sorted(places)]

@@ -1,0 +1,129 @@
+"""graspWith(obj, hand): come down on an object, close the fingers, lift it and carry it aside."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from cognitive_arch.execution.environment import FailureReason
+from cognitive_arch.world.observation import HANDS
+from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, STROKE
+from sim.kinematics import HandTarget, Vector
+from sim.robot import YAWS, Grip, Robot
+from sim.skills.base import release
+from sim.world import Joints
+
+TIP_HEIGHT = 0.004  # m of the finger tips above the object's underside
+MARGIN = 0.015  # m between each open finger and the object
+SQUEEZE = 0.010  # m that the closing fingers are commanded into the object
+CARRY = {"LeftHand": (-0.24, -0.17), "RightHand": (-0.24, 0.17)}  # m, where a full hand waits
+CARRY_HEIGHT = 0.17  # m above the table
+
+
+def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
+    """See `base.Skill`."""
+    name, hand = args
+    obstacle = _obstacle(robot, name, hand)
+    if obstacle is not None:
+        return obstacle
+    aim = robot.noise.draw(hand, robot.rng)
+    width, yaws = grip_choices(robot, name)
+    grip = Grip(min(STROKE, width / 2 + MARGIN), max(0.0, width / 2 - SQUEEZE), yaws)
+    plan = _plan(robot, name, hand, grip, aim)
+    if plan is None:
+        return FailureReason.OUT_OF_REACH
+    start, down = plan
+    world = robot.world
+    robot.travel(world.with_fingers(start, hand, grip.opening))
+    world.follow([world.with_fingers(q, hand, grip.opening) for q in down], 1.0)
+    world.move_fingers(hand, grip.closed, 0.5)
+    world.hold(0.15)
+    up = [world.with_fingers(q, hand, grip.closed) for q in [*down[-2::-1], start]]
+    world.follow(up, 1.0)
+    world.hold(0.1)
+    if robot.perception.held(hand) != name:
+        release(robot, hand, STROKE)
+        robot.go_home(hand)
+        return FailureReason.NOT_GRASPED
+    robot.grips[hand] = grip
+    carry(robot, hand)
+    return FailureReason.NONE if robot.perception.held(hand) == name else FailureReason.SLIPPED
+
+
+def _obstacle(robot: Robot, name: str, hand: str) -> FailureReason | None:
+    held = {h: robot.perception.held(h) for h in HANDS}
+    if held[hand] is not None or name in held.values():
+        return FailureReason.HAND_BUSY
+    if robot.perception.covered_by(name):
+        return FailureReason.COVERED
+    width, _ = grip_choices(robot, name)
+    return None if width / 2 + 0.005 <= STROKE else FailureReason.TOO_WIDE
+
+
+def grip_choices(robot: Robot, name: str) -> tuple[float, tuple[float, ...]]:
+    """Width between the fingers (metres) and the hand yaws (radians) at which the object can be held."""
+    shape = robot.domain.objects[name].shape
+    yaw = robot.world.pose(name).rotation().ToRollPitchYaw().yaw_angle()
+    if shape.type == "box":
+        faces = [(_wrap(yaw), shape.size[1]), (_wrap(yaw + math.pi / 2), shape.size[0])]
+        width = min(size for _, size in faces)
+        return width, tuple(angle for angle, size in faces if size <= width + 1e-6)
+    if shape.type == "tool":
+        return shape.width, (_wrap(yaw),)
+    return 2 * shape.radius, YAWS
+
+
+def _wrap(angle: float) -> float:
+    """The angle within +-pi/2 that describes the same line."""
+    return (angle + math.pi / 2) % math.pi - math.pi / 2
+
+
+def _plan(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> tuple[Joints, list[Joints]] | None:
+    p_WO = robot.world.pose(name).translation() + aim
+    bottom = p_WO[2] - robot.world.height(name) / 2
+    tips = np.array([p_WO[0], p_WO[1], bottom + TIP_HEIGHT])
+    targets = robot.grasp_targets(hand, tips, grip.yaws)
+    # Sorting is stable: among equally free directions the more upright and straighter ones stay first.
+    targets.sort(key=lambda target: -min(0.0, _clearance(robot, name, target, grip)))
+    for target in targets:
+        if _clearance(robot, name, target, grip) < -0.01:
+            continue
+        found = robot.descent(hand, target)
+        if found is not None:
+            return found
+    return None
+
+
+def _clearance(robot: Robot, name: str, target: HandTarget, grip: Grip) -> float:
+    """Free space (metres) between the open fingers and the nearest other object at finger height."""
+    assert target.fingers_W is not None
+    free = 1.0
+    for other in robot.world.scenario.objects:
+        p_WN = robot.world.pose(other).translation()
+        same_stack = math.dist(p_WN[:2], robot.world.pose(name).translation()[:2]) < 0.02
+        if other == name or same_stack or robot.top_of(other) < target.p_WP[2]:
+            continue
+        for sign in (1, -1):
+            middle = target.p_WP[:2] + sign * (grip.opening + FINGER_THICKNESS / 2) * target.fingers_W[:2]
+            reach = math.hypot(FINGER_WIDTH / 2, FINGER_THICKNESS / 2) + robot.perception.radius(other)
+            free = min(free, math.dist(middle, p_WN[:2]) - reach)
+    return free
+
+
+def carry(robot: Robot, hand: str) -> None:
+    """Move what the hand holds to where a full hand waits, level, out of the other hand's way."""
+    height = robot.scene.table.height + CARRY_HEIGHT
+    target = object_target(robot, hand, np.array([*CARRY[hand], height]), None)
+    joints = robot.kinematics.solve(hand, target, robot.rest(hand))
+    if joints is not None:
+        robot.travel(joints)
+
+
+def object_target(robot: Robot, hand: str, p_WO: Vector, fingers_W: Vector | None) -> HandTarget:
+    """The hand pose that brings what it holds to `p_WO` (its centre, metres), lying level."""
+    name = robot.perception.held(hand)
+    assert name is not None
+    X_HO = robot.world.hand_pose(hand).inverse() @ robot.world.pose(name)
+    up_H = X_HO.rotation().matrix()[:, 2]
+    return HandTarget(X_HO.translation(), p_WO, up_H, np.array([0.0, 0.0, 1.0]), 0.03, fingers_W)
