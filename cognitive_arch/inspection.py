@@ -92,8 +92,15 @@ def _world(store: RunStore, run: Run, steps: list[dict[str, Any]], number: int) 
         there = f"{steps[0]['step']} to {steps[-1]['step']}" if steps else "none"
         raise StoreError(f"run {run.run_id} has no step {number}; valid: {there}")
     state = store.worlds.get(run.run_id, record["world_before"])
-    data = {"run_id": run.run_id, "step": record, "world": state.to_json(), "atoms": sorted_atoms(state.atoms())}
-    return View(data, "\n".join([f"the world when step {number} began", *_world_lines(state), step_text(record)]))
+    data = {
+        "run_id": run.run_id,
+        "step": record,
+        "world": state.to_json(),
+        "atoms": sorted_atoms(state.atoms()),
+    }
+    return View(
+        data, "\n".join([f"the world when step {number} began", *_world_lines(state), step_text(record)])
+    )
 
 
 def _world_lines(state: WorldState) -> list[str]:

@@ -37,9 +37,20 @@ def step_text(record: dict[str, Any]) -> str:
             f"plan of {len(plan['actions'])}, probability {plan['goal_probability']:.2f}, "
             f"value {plan['value']:.2f}, horizon {record['horizon']}"
         )
-        change = [f"+{atom}" for atom in record["added"]] + [f"-{atom}" for atom in record["removed"]]
+        change = _brief("+", record["added"]) + _brief("-", record["removed"])
         lines.append("        " + (" ".join(change) or "nothing changed"))
     return "\n".join(lines)
+
+
+def _brief(sign: str, atoms: Sequence[str]) -> list[str]:
+    """Atoms with a sign; several that differ in the last argument only become one: `-on(Ham,*3)`."""
+    groups: dict[str, list[str]] = {}
+    for atom in atoms:
+        groups.setdefault(atom.rpartition(",")[0] or atom, []).append(atom)
+    return [
+        f"{sign}{same[0]}" if len(same) == 1 else f"{sign}{stem},*{len(same)})"
+        for stem, same in groups.items()
+    ]
 
 
 def result_text(result: dict[str, Any]) -> str:
@@ -47,7 +58,8 @@ def result_text(result: dict[str, Any]) -> str:
     verdict = "done" if result["success"] else f"failed: {result['explanation']}"
     lines = [
         verdict,
-        f"{result['good']} of {result['total']} actions worked, speed {result['speed']:.2f}, {result['wall_s']:.1f} s",
+        f"{result['good']} of {result['total']} actions worked, "
+        f"speed {result['speed']:.2f}, {result['wall_s']:.1f} s",
         f"kept as {result['run_id']} in {result['store']}; see: cogarch inspect {result['run_id']}",
     ]
     lines.extend(f"wrote {path}" for path in result["artifacts"])

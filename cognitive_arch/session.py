@@ -144,7 +144,10 @@ class Session:
         return self._setting.understand(sentence, self._world.state.held)
 
     def perform(
-        self, task: Task, progress: Progress = Progress(), settings: CycleSettings = CycleSettings()  # noqa: B008
+        self,
+        task: Task,
+        progress: Progress = Progress(),
+        settings: CycleSettings = CycleSettings(),
     ) -> EpisodeResult:
         """Do `task`; returns when its goal holds or nothing is left to try."""
         self._world.begin_instruction()
@@ -163,7 +166,10 @@ class Session:
 
 
 def run_task(
-    sentence: str, config: RunConfig, store_folder: Path, progress: Progress = Progress()  # noqa: B008
+    sentence: str,
+    config: RunConfig,
+    store_folder: Path,
+    progress: Progress = Progress(),
 ) -> dict[str, Any]:
     """Run one sentence from start to end and keep it in the store; returns the fields of `run --json`.
 

@@ -24,8 +24,8 @@ from cognitive_arch.errors import BackendError, one_line
 from sim import hands, meshes
 
 MODEL = "iCubGazeboV2_7"
-MESH_CELL = 0.005
-"""Side (metres) of the cubes in which mesh corners are merged."""
+MESH_CELL, HIDDEN_MESH_CELL = 0.006, 0.014
+"""Side (metres) of the cubes in which mesh corners are merged; coarser for what the table hides."""
 
 EFFORT = {"torso": 80.0, "shoulder": 60.0, "elbow": 30.0, "wrist": 8.0}  # N m
 VELOCITY = 3.0  # rad/s
@@ -33,6 +33,7 @@ DAMPING = 0.5  # N m s/rad
 NECK_DOWN = {"neck_pitch": -0.60}  # rad, looks at the table in front of the robot
 FOREARM = {"radius": 0.033, "length": 0.10}  # m
 _FIXED = re.compile(r"hip|knee|ankle|neck")
+_HIDDEN = re.compile(r"hip|knee|ankle|foot|sole|leg|root_link")
 _KEEP = re.compile(r"dh_frame|^imu|root_link|base_link")
 
 
@@ -170,6 +171,7 @@ def _convert_meshes(robot: ET.Element, source: Path, folder: Path) -> None:
     """Write every visual mesh once as a thinned OBJ; drop all mesh collisions."""
     written: set[str] = set()
     for link in robot.findall("link"):
+        cell = HIDDEN_MESH_CELL if _HIDDEN.search(link.get("name") or "") else MESH_CELL
         for collision in link.findall("collision"):
             link.remove(collision)
         for mesh in link.iterfind("visual/geometry/mesh"):
@@ -177,7 +179,7 @@ def _convert_meshes(robot: ET.Element, source: Path, folder: Path) -> None:
             target = path.stem + ".obj"
             if target not in written:
                 triangles = meshes.read_stl(path) * np.array(_numbers(mesh.get("scale"), "1 1 1"))
-                meshes.write_obj(folder / target, *meshes.decimate(triangles, MESH_CELL))
+                meshes.write_obj(folder / target, *meshes.decimate(triangles, cell))
                 written.add(target)
             mesh.set("filename", target)
             mesh.attrib.pop("scale", None)

@@ -82,6 +82,8 @@ class DrakeEnvironment:
         started, name = self.world.time, action.args[0]
         before = self.world.pose(name).translation()
         reason = entry.perform(self.robot, action.args)
+        if self._photographer:
+            self._photographer.after_action()
         moved = self.world.pose(name).translation() - before
         effect = {f"displacement_{axis}": float(d) for axis, d in zip("xyz", moved, strict=True)}
         effect["duration"] = self.world.time - started

@@ -71,7 +71,9 @@ def add_contact(collision: ET.Element, friction: float) -> None:
 
 def add_actuator(robot: ET.Element, joint: str) -> None:
     """Declare a motor for a joint (icub-models' files have none)."""
-    transmission = ET.SubElement(robot, "transmission", name=f"{joint}_transmission", type="SimpleTransmission")
+    transmission = ET.SubElement(
+        robot, "transmission", name=f"{joint}_transmission", type="SimpleTransmission"
+    )
     ET.SubElement(transmission, "type").text = "transmission_interface/SimpleTransmission"
     actuator = ET.SubElement(transmission, "actuator", name=joint)
     ET.SubElement(actuator, "mechanicalReduction").text = "1"

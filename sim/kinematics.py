@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.multibody.inverse_kinematics import InverseKinematics
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.solvers import SnoptSolver
@@ -82,9 +82,7 @@ class Kinematics:
         frame = self.plant.GetFrameByName(f"{SIDES[hand]}_hand_dh_frame")
         return frame.CalcPoseInWorld(self._context)
 
-    def solve(
-        self, hand: str, target: HandTarget, near: Joints, restarts: int = RESTARTS
-    ) -> Joints | None:
+    def solve(self, hand: str, target: HandTarget, near: Joints, restarts: int = RESTARTS) -> Joints | None:
         """Joints close to `near` that meet `target`, or None. Fingers keep their position.
 
         Restarts draw from a generator of their own, seeded by the attempt, so that the answer depends on
@@ -113,9 +111,7 @@ class Kinematics:
         problem.AddPositionConstraint(
             frame, target.p_HP, world, target.p_WP - tolerance, target.p_WP + tolerance
         )
-        problem.AddAngleBetweenVectorsConstraint(
-            frame, target.axis_H, world, target.axis_W, 0, target.tilt
-        )
+        problem.AddAngleBetweenVectorsConstraint(frame, target.axis_H, world, target.axis_W, 0, target.tilt)
         if target.fingers_W is not None:
             problem.AddAngleBetweenVectorsConstraint(
                 frame, np.array([0.0, 1.0, 0.0]), world, target.fingers_W, 0, target.yaw_tolerance
@@ -126,9 +122,7 @@ class Kinematics:
             links = [f"{SIDES[other]}_forearm"] + ([f"{SIDES[other]}_hand_dh_frame"] if other != hand else [])
             for link in links:
                 low, high = np.array([-2.0, -2.0, floor]), np.full(3, 2.0)
-                problem.AddPositionConstraint(
-                    self.plant.GetFrameByName(link), np.zeros(3), world, low, high
-                )
+                problem.AddPositionConstraint(self.plant.GetFrameByName(link), np.zeros(3), world, low, high)
         q, program = problem.q(), problem.get_mutable_prog()
         idle = SIDES[next(h for h in HANDS if h != hand)]
         for name, index in zip(self._names, self._index, strict=True):
@@ -144,7 +138,9 @@ class Kinematics:
         keep = ["finger" in name for name in self._names]
         return np.where(keep, near, solution)
 
-    def line(self, hand: str, target: HandTarget, end: Vector, start: Joints, pieces: int = 4) -> list[Joints] | None:
+    def line(
+        self, hand: str, target: HandTarget, end: Vector, start: Joints, pieces: int = 4
+    ) -> list[Joints] | None:
         """Waypoints of a straight line from `target.p_WP` (where the hand is at `start`) to `end`."""
         path, joints = [], start
         for fraction in np.linspace(0, 1, pieces + 1)[1:]:
@@ -174,5 +170,3 @@ def finger_directions(yaws: Sequence[float]) -> list[Vector]:
         direction = np.array([-np.sin(yaw), np.cos(yaw), 0.0])
         directions += [direction, -direction]
     return directions
-
-

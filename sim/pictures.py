@@ -25,7 +25,8 @@ from sim.world import RECORDING_FPS, World
 
 RENDERER = "pictures"
 WIDTH, HEIGHT, FIELD_OF_VIEW = 960, 720, 0.75  # pixels, pixels, radians
-CAMERA_FROM, CAMERA_TO = (-1.35, 0.62, 0.55), (-0.18, 0.0, 0.02)  # m
+RECORDING_LIMIT = 240.0  # simulated s
+CAMERA_FROM, CAMERA_TO = (-1.12, 0.60, 0.46), (-0.17, 0.02, 0.05)  # m
 
 
 def look_from(p_WC: Sequence[float], p_WT: Sequence[float]) -> RigidTransform:
@@ -44,8 +45,8 @@ def check_rendering() -> None:
         ctypes.CDLL("libEGL.so.1")
     except OSError:
         raise BackendError(
-            "pictures need the system library libEGL; install it (Debian, Ubuntu: sudo apt-get install libegl1) "
-            "or run with --no-record"
+            "pictures need the system library libEGL; install it "
+            "(Debian, Ubuntu: sudo apt-get install libegl1) or run with --no-record"
         ) from None
 
 
@@ -57,10 +58,11 @@ class Photographer:
         self._world = world
         self._pictures: dict[str, NDArray[np.uint8]] = {}
         lights = [
-            LightParameter(type="directional", direction=[0.5, -0.4, -0.8], intensity=1.6, frame="world"),
-            LightParameter(type="directional", direction=[0.6, 0.7, -0.4], intensity=0.8, frame="world"),
+            LightParameter(type="directional", direction=[0.4, -0.3, -1.0], intensity=0.9, frame="world"),
+            LightParameter(type="directional", direction=[1.0, 0.3, -0.25], intensity=0.55, frame="world"),
+            LightParameter(type="directional", direction=[0.1, -1.0, -0.3], intensity=0.45, frame="world"),
         ]
-        params = RenderEngineVtkParams(default_clear_color=[0.90, 0.93, 0.96], lights=lights, cast_shadows=True, shadow_map_size=1024)
+        params = RenderEngineVtkParams(default_clear_color=[0.90, 0.93, 0.96], lights=lights)
         world.scenario.scene_graph.AddRenderer(
             world.scenario.scene_graph.GetMyMutableContextFromRoot(world.simulator.get_mutable_context()),
             RENDERER,
@@ -81,6 +83,11 @@ class Photographer:
         meshcat.SetProperty("/Axes", "visible", False)
         meshcat.SetCameraPose(CAMERA_FROM, CAMERA_TO)
         meshcat.StartRecording(frames_per_second=RECORDING_FPS, set_visualizations_while_recording=False)
+
+    def after_action(self) -> None:
+        """Keep the recording below 15 MB: an episode this long has shown what there is to see."""
+        if self._world.time > RECORDING_LIMIT and self._world.meshcat is not None:
+            self._world.meshcat.StopRecording()
 
     def take(self, name: str) -> None:
         """Take a picture of the present moment."""

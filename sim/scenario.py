@@ -12,8 +12,17 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Box, Cylinder, ProximityProperties, SceneGraph, Shape, Sphere
-from pydrake.geometry import AddContactMaterial, CollisionFilterDeclaration, GeometrySet
+from pydrake.geometry import (
+    AddContactMaterial,
+    Box,
+    CollisionFilterDeclaration,
+    Cylinder,
+    GeometrySet,
+    ProximityProperties,
+    SceneGraph,
+    Shape,
+    Sphere,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import (
@@ -23,7 +32,13 @@ from pydrake.multibody.plant import (
     DiscreteContactApproximation,
     MultibodyPlant,
 )
-from pydrake.multibody.tree import ModelInstanceIndex, PdControllerGains, RigidBody, SpatialInertia, UnitInertia
+from pydrake.multibody.tree import (
+    ModelInstanceIndex,
+    PdControllerGains,
+    RigidBody,
+    SpatialInertia,
+    UnitInertia,
+)
 from pydrake.systems.framework import DiagramBuilder
 
 from cognitive_arch import domain as dom
@@ -197,12 +212,25 @@ def _pad_places(shape: dom.Cylinder | dom.Box) -> list[tuple[float, float]]:
         rings = [(outer, 8), (inner, 4)]
     elif max(shape.size[:2]) <= 0.08:
         half = min(shape.size[:2]) / 2 - PAD_RADIUS
-        corners = [(sx * (shape.size[0] / 2 - PAD_RADIUS), sy * (shape.size[1] / 2 - PAD_RADIUS)) for sx in (-1, 1) for sy in (-1, 1)]
-        return corners + [(0.6 * half * math.cos(a), 0.6 * half * math.sin(a)) for a in np.arange(4) * math.pi / 2]
+        corners = [
+            (sx * (shape.size[0] / 2 - PAD_RADIUS), sy * (shape.size[1] / 2 - PAD_RADIUS))
+            for sx in (-1, 1)
+            for sy in (-1, 1)
+        ]
+        return corners + [
+            (0.6 * half * math.cos(a), 0.6 * half * math.sin(a)) for a in np.arange(4) * math.pi / 2
+        ]
     else:
-        xs, ys = (np.linspace(-s / 2 + PAD_RADIUS, s / 2 - PAD_RADIUS, max(2, math.ceil(s / 0.06) + 1)) for s in shape.size[:2])
+        xs, ys = (
+            np.linspace(-s / 2 + PAD_RADIUS, s / 2 - PAD_RADIUS, max(2, math.ceil(s / 0.06) + 1))
+            for s in shape.size[:2]
+        )
         return [(float(x), float(y)) for x in xs for y in ys]
-    return [(r * math.cos(2 * math.pi * k / n), r * math.sin(2 * math.pi * k / n)) for r, n in rings for k in range(n)]
+    return [
+        (r * math.cos(2 * math.pi * k / n), r * math.sin(2 * math.pi * k / n))
+        for r, n in rings
+        for k in range(n)
+    ]
 
 
 def _set_gains(plant: MultibodyPlant) -> None:
@@ -216,7 +244,9 @@ def _set_gains(plant: MultibodyPlant) -> None:
             actuator.set_default_gear_ratio(GEAR_RATIO)
 
 
-def _let_robot_overlap_itself(plant: MultibodyPlant, scene_graph: SceneGraph, robot: ModelInstanceIndex) -> None:
+def _let_robot_overlap_itself(
+    plant: MultibodyPlant, scene_graph: SceneGraph, robot: ModelInstanceIndex
+) -> None:
     """The primitives of neighbouring links overlap by construction; only their contacts are dropped."""
     own = GeometrySet()
     for index in plant.GetBodyIndices(robot):

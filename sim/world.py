@@ -17,7 +17,7 @@ from sim.scenario import FRICTION, Scenario, build_scenario
 
 Joints = NDArray[np.float64]
 COMMAND_PERIOD = 0.02  # s between two set points of a motion
-RECORDING_FPS = 12.0
+RECORDING_FPS = 5.0  # the viewer interpolates between frames
 
 HOME: Mapping[str, float] = {  # rad; both hands beside the table's work area, well above it
     "torso_pitch": 0.1,
@@ -35,7 +35,9 @@ HOME: Mapping[str, float] = {  # rad; both hands beside the table's work area, w
 class World:
     """One episode's physics. Joint vectors list the actuated joints in the order of `joint_names`."""
 
-    def __init__(self, domain: Domain, scene: Scene, *, record: bool = False, friction: float = FRICTION) -> None:
+    def __init__(
+        self, domain: Domain, scene: Scene, *, record: bool = False, friction: float = FRICTION
+    ) -> None:
         self.domain = domain
         self.scene = scene
         self.scenario: Scenario = build_scenario(domain, scene, friction=friction)
@@ -53,7 +55,8 @@ class World:
         self._positions = np.array([joint.position_start() for joint in joints])
         self._desired = plant.get_desired_state_input_port(robot)
         self._fingers = {
-            hand: [self.joint_names.index(name) for name in finger_names(side)] for hand, side in SIDES.items()
+            hand: [self.joint_names.index(name) for name in finger_names(side)]
+            for hand, side in SIDES.items()
         }
         self.home = np.array([HOME.get(n, STROKE if "finger" in n else 0.0) for n in self.joint_names])
         self.command = self.home.copy()

@@ -40,8 +40,8 @@ def make_environment(
         module: Any = importlib.import_module("sim.environment")
     except ImportError as error:
         raise BackendError(
-            f"the drake backend cannot be loaded ({one_line(error)}); install the packages drake and icub-models, "
-            "or use --backend symbolic"
+            f"the drake backend cannot be loaded ({one_line(error)}); "
+            "install the packages drake and icub-models, or use --backend symbolic"
         ) from None
     environment: Environment = module.DrakeEnvironment(
         domain, scene, noise=asdict(noise), jitter=jitter, record=record

@@ -104,8 +104,8 @@ class PlanningCycle:
         rules: RuleSet,
         rng: np.random.Generator,
         *,
-        heuristics: Heuristics = Heuristics(),  # noqa: B008 (frozen)
-        settings: CycleSettings = CycleSettings(),  # noqa: B008 (frozen)
+        heuristics: Heuristics = Heuristics(),
+        settings: CycleSettings = CycleSettings(),
         on_act: Callable[[GroundAction], None] = lambda action: None,
         on_step: Callable[[Step], None] = lambda step: None,
     ) -> None:
@@ -142,7 +142,8 @@ class PlanningCycle:
                 state = self._world.state
                 self._record(total + 1, state, events, plan, None, None, state)
                 return self._result(end, good, total, state)
-            assert plan is not None and plan.action is not None
+            assert plan is not None
+            assert plan.action is not None
             self._on_act(plan.action)
             result = self._environment.execute(plan.action)
             after = self._world.update(self._environment.observe())
@@ -206,7 +207,7 @@ class PlanningCycle:
             lost = undone(progress.goals[progress.index - 1], progress.goal, state)
             if not lost:
                 return
-            why = f"{', '.join(map(str, lost))} was reached and no longer holds: back to sub-goal {progress.index}"
+            why = f"{', '.join(map(str, lost))} no longer holds: back to sub-goal {progress.index}"
             events.append(Event(EventKind.GOAL_MAINTENANCE, why))
             progress.reached.discard(progress.index - 1)
             self._move_to(progress.index - 1)

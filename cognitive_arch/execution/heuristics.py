@@ -102,7 +102,9 @@ def undone(previous: Goal, current: Goal, state: State) -> tuple[Literal, ...]:
     return tuple(lit for lit in current if lit in previous and not lit.holds(state))
 
 
-def action_worked(rules: Mapping[GroundAction, GroundRule], action: GroundAction, before: State, after: State) -> bool:
+def action_worked(
+    rules: Mapping[GroundAction, GroundRule], action: GroundAction, before: State, after: State
+) -> bool:
     """Whether `action` did what it is for: something changed, and all of its first outcome is there."""
     rule = rules.get(action)
     if rule is None or before == after:

@@ -64,5 +64,6 @@ def _level(text: str) -> float:
         return float(text)
     except ValueError:
         raise ConfigError(
-            f"'{one_line(text)}' is not a noise level; valid: a number from 0 to 1, or left=..,right=..,pull=..,push=.."
+            f"'{one_line(text)}' is not a noise level; "
+            "valid: a number from 0 to 1, or left=..,right=..,pull=..,push=.."
         ) from None

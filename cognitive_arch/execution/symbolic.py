@@ -174,7 +174,9 @@ class SymbolicEnvironment:
         for literal in rule.outcomes[0].literals:
             name, args = literal.atom
             if name == "inHand" and literal.positive:
-                self._things[args[0]] = replace(self._things[args[0]], place=self._xy(args[0]), support=None, hand=args[1])
+                self._things[args[0]] = replace(
+                    self._things[args[0]], place=self._xy(args[0]), support=None, hand=args[1]
+                )
             elif name == "on" and literal.positive:
                 self._things[args[0]] = replace(self._things[args[0]], support=args[1], hand=None)
             elif name == "inHand" and args[0] not in placed:
@@ -184,7 +186,9 @@ class SymbolicEnvironment:
                 self._shift(args[0], PULL_DISTANCE if literal.positive else -PULL_DISTANCE)
             elif name not in ("inHand", "on", "isClear", "reachableWith"):
                 change = frozenset({str(literal.atom)})
-                self._properties = self._properties | change if literal.positive else self._properties - change
+                self._properties = (
+                    self._properties | change if literal.positive else self._properties - change
+                )
 
     @staticmethod
     def _was_held(rule: GroundRule) -> bool:

@@ -95,7 +95,7 @@ class GoalCompiler:
         if instruction.object in in_hand:
             return in_hand[instruction.object]
         if rule.action.startswith(("pull", "push")) and in_hand:
-            return next(reversed(in_hand.values()))
+            return list(in_hand.values())[-1]
         free = [hand for hand in hands if hand not in in_hand.values()]
         return (free or list(hands))[0]
 

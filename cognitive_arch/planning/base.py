@@ -47,7 +47,10 @@ class Planner(Protocol):
     Law: same arguments and a generator in the same state give the same result.
     """
 
-    name: str
+    @property
+    def name(self) -> str:
+        """What `--planner` calls it."""
+        ...
 
     def plan(
         self,

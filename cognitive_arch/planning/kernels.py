@@ -104,13 +104,15 @@ def sample_sequences(  # type: ignore[no-untyped-def]
                 remaining -= mass
             if chosen < n_actions:
                 _advance(
-                    chosen, action_ptr, effect_ptr, effect_atom, effect_set, effect_change, weights, belief, delta
+                    chosen, action_ptr, effect_ptr, effect_atom, effect_set, effect_change,
+                    weights, belief, delta,
                 )  # fmt: skip
             elif t == 0 and total > 0.0:
                 # Rounding may leave the draw past the last action; doNothing is not allowed first.
                 chosen = sequences[n, 0] = _last_positive(action_ptr, effect_ptr, weights)
                 _advance(
-                    chosen, action_ptr, effect_ptr, effect_atom, effect_set, effect_change, weights, belief, delta
+                    chosen, action_ptr, effect_ptr, effect_atom, effect_set, effect_change,
+                    weights, belief, delta,
                 )  # fmt: skip
             sequences[n, t] = chosen
             factor *= discount
@@ -147,7 +149,8 @@ def evaluate_sequence(  # type: ignore[no-untyped-def]
         if sequence[t] < n_actions:
             _rule_weights(action_ptr, context_ptr, context_atom, context_sign, belief, threshold, weights)
             _advance(
-                sequence[t], action_ptr, effect_ptr, effect_atom, effect_set, effect_change, weights, belief, delta
+                sequence[t], action_ptr, effect_ptr, effect_atom, effect_set, effect_change,
+                    weights, belief, delta,
             )  # fmt: skip
         factor *= discount
         probability = _goal_probability(goal_atom, goal_sign, belief)

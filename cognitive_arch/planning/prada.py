@@ -63,9 +63,7 @@ class Prada:
         return self._evaluate(problem, np.empty(0, dtype=np.int32))[1]
 
     def _evaluate(self, problem: Problem, sequence: NDArray[np.int32]) -> tuple[float, float]:
-        value, peak, _ = kernels.evaluate_sequence(
-            *problem.arrays(), sequence, self.discount, self.threshold
-        )
+        value, peak, _ = kernels.evaluate_sequence(*problem.arrays(), sequence, self.discount, self.threshold)
         return float(value), float(peak)
 
     def _result(self, problem: Problem, sequence: NDArray[np.int32] | None, horizon: int) -> PlanResult:

@@ -75,7 +75,9 @@ def compile_problem(state: State, goal: Goal, rules: Sequence[GroundRule]) -> Pr
     ordered = [rule for action in actions for rule in live[action]]
     atoms = sorted(changing | {lit.atom for lit in goal} | {a for r in ordered for a in _atoms(r.context)})
     index = {atom: i for i, atom in enumerate(atoms)}
-    contexts = [[(index[lit.atom], lit.positive) for lit in r.context if lit.atom in changing] for r in ordered]
+    contexts = [
+        [(index[lit.atom], lit.positive) for lit in r.context if lit.atom in changing] for r in ordered
+    ]
     effects = [_effects(rule, index) for rule in ordered]
     goals = [(index[lit.atom], lit.positive) for lit in goal]
     return Problem(

@@ -126,7 +126,7 @@ class _Builder:
         self.rules.append(NIDRule(str(name), params, lifted, tuple(listed), node.meta.line))
 
     def probability(self, outcome: Tree[Any], total: float) -> tuple[float, float]:
-        value = float(outcome.children[0])
+        value = float(str(outcome.children[0]))
         if not 0 <= value <= 1:
             raise self.fail(outcome.meta.line, f"{outcome.children[0]} is not a probability (0 to 1)")
         return value, total + value
@@ -135,7 +135,8 @@ class _Builder:
         return tuple(self.literal(child, params) for child in node.children)
 
     def literal(self, node: Tree[Any], params: tuple[Parameter, ...]) -> LiftedLiteral:
-        sign, name, arguments = node.children
+        sign, predicate, arguments = node.children
+        name = str(predicate)
         line = node.meta.line
         if name not in self.predicates:
             raise self.fail(line, unknown("predicate", name, self.predicates))

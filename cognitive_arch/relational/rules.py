@@ -115,7 +115,9 @@ class RuleSet:
             current = self.types.get(current)
         return False
 
-    def ground(self, entities: Sequence[Entity], actions: frozenset[str] | None = None) -> tuple[GroundRule, ...]:
+    def ground(
+        self, entities: Sequence[Entity], actions: frozenset[str] | None = None
+    ) -> tuple[GroundRule, ...]:
         """All groundings over `entities`, in the order of the rules and of the sorted names.
 
         Variables are bound to distinct entities of their type. A grounding whose context contradicts
@@ -132,7 +134,9 @@ class RuleSet:
                 ground.extend(self._ground_rule(rule, known))
         return tuple(ground)
 
-    def ground_call(self, rule: NIDRule, args: Sequence[str], entities: Sequence[Entity]) -> GroundRule | None:
+    def ground_call(
+        self, rule: NIDRule, args: Sequence[str], entities: Sequence[Entity]
+    ) -> GroundRule | None:
         """`rule` with its parameters bound to `args`; None if its context contradicts itself."""
         binding = dict(zip((p.name for p in rule.parameters), args, strict=True))
         return self._bind(rule, binding, sorted(set(entities)))
@@ -162,7 +166,8 @@ class RuleSet:
             return None
         outcomes = tuple(
             GroundOutcome(
-                o.probability, _unique(lit for l in o.literals for lit in self._expand(l, binding, entities))
+                o.probability,
+                _unique(lit for lifted in o.literals for lit in self._expand(lifted, binding, entities)),
             )
             for o in rule.outcomes
         )

@@ -70,7 +70,9 @@ class RunStore:
         self.folder = folder
         path = folder / DATABASE
         if not create and not path.is_file():
-            raise StoreError(f"there is no run store in '{folder}'; a run creates one, or name another with --store")
+            raise StoreError(
+                f"there is no run store in '{folder}'; a run creates one, or name another with --store"
+            )
         try:
             folder.mkdir(parents=True, exist_ok=True)
             # Autocommit: transactions are begun explicitly, one per step.
@@ -118,7 +120,9 @@ class RunStore:
         except FileExistsError:
             return None
         except OSError as error:
-            raise StoreError(f"cannot write to the run store '{self.folder}': {one_line(error, 200)}") from None
+            raise StoreError(
+                f"cannot write to the run store '{self.folder}': {one_line(error, 200)}"
+            ) from None
         return lock
 
     @contextmanager
@@ -130,7 +134,9 @@ class RunStore:
         except sqlite3.Error as error:
             if self._db.in_transaction:
                 self._db.execute("ROLLBACK")
-            raise StoreError(f"cannot write to the run store '{self.folder}': {one_line(error, 200)}") from None
+            raise StoreError(
+                f"cannot write to the run store '{self.folder}': {one_line(error, 200)}"
+            ) from None
 
     # -- reading ------------------------------------------------------------------------------------
 
@@ -149,7 +155,9 @@ class RunStore:
             return matching[0]
         recent = [run.run_id for run in runs[-5:]]
         if matching:
-            raise StoreError(f"'{one_line(name)}' fits {len(matching)} runs: {', '.join(r.run_id for r in matching[:5])}")
+            raise StoreError(
+                f"'{one_line(name)}' fits {len(matching)} runs: {', '.join(r.run_id for r in matching[:5])}"
+            )
         raise StoreError(unknown("run", name, [*recent, "latest"] if recent else []))
 
     def steps(self, run_id: str) -> list[dict[str, Any]]:

@@ -24,7 +24,9 @@ def rng() -> np.random.Generator:
 
 
 def certain(rules: tuple[GroundRule, ...]) -> tuple[GroundRule, ...]:
-    return tuple(rule.with_first_probability(1.0 - sum(o.probability for o in rule.outcomes[1:])) for rule in rules)
+    return tuple(
+        rule.with_first_probability(1.0 - sum(o.probability for o in rule.outcomes[1:])) for rule in rules
+    )
 
 
 def test_names_are_complete() -> None:

@@ -53,12 +53,16 @@ def episode(
     heuristics: str = "all",
     seed: int = 0,
     noise: str = "0",
-    settings: CycleSettings = CycleSettings(),  # noqa: B008
+    settings: CycleSettings = CycleSettings(),
     **meddling: object,
 ) -> tuple[EpisodeResult, list[Step], Meddled]:
     setting = Setting.load(scene)
     environment = Meddled(
-        setting.domain, setting.scene, setting.rules, NoiseLevels.parse(noise), **meddling  # type: ignore[arg-type]
+        setting.domain,
+        setting.scene,
+        setting.rules,
+        NoiseLevels.parse(noise),
+        **meddling,  # type: ignore[arg-type]
     )
     task = setting.understand(sentence)
     steps: list[Step] = []
@@ -192,7 +196,12 @@ def test_a_goal_that_does_not_last_is_not_reached() -> None:
     steps: list[Step] = []
     task = setting.understand(SANDWICH)
     cycle = PlanningCycle(
-        env, WorldModel(), make_planner("a-prada"), setting.rules, np.random.default_rng(0), on_step=steps.append
+        env,
+        WorldModel(),
+        make_planner("a-prada"),
+        setting.rules,
+        np.random.default_rng(0),
+        on_step=steps.append,
     )
     result = cycle.run(task.goals, env.reset(0))
     assert result.success

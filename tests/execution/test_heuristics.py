@@ -38,7 +38,9 @@ def test_parse_noise() -> None:
     assert NoiseLevels.parse(str(NoiseLevels(0.1, 0.2, 0.3, 0.4))) == NoiseLevels(0.1, 0.2, 0.3, 0.4)
 
 
-@pytest.mark.parametrize("text", ["", "x", "-0.1", "1.1", "nan", "inf", "left", "left=", "foot=0.1", "left=2", "left=0,left=1"])
+@pytest.mark.parametrize(
+    "text", ["", "x", "-0.1", "1.1", "nan", "inf", "left", "left=", "foot=0.1", "left=2", "left=0,left=1"]
+)
 def test_bad_noise(text: str) -> None:
     with pytest.raises(ConfigError, match="noise"):
         NoiseLevels.parse(text)

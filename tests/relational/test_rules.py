@@ -18,7 +18,9 @@ def by_name(rules: tuple[GroundRule, ...], text: str) -> GroundRule:
 
 def test_grounding_is_typed(ground: tuple[GroundRule, ...]) -> None:
     # 3 objects, 2 hands, no tool: 6 grasps, 6 drops, 12 puts and neither pull nor push.
-    counts = {name: sum(r.action.name == name for r in ground) for name in ("graspWith", "dropWith", "putOnWith")}
+    counts = {
+        name: sum(r.action.name == name for r in ground) for name in ("graspWith", "dropWith", "putOnWith")
+    }
     assert counts == {"graspWith": 6, "dropWith": 6, "putOnWith": 12}
     assert len(ground) == 24
 
@@ -34,7 +36,13 @@ def test_all_and_otherhand(ground: tuple[GroundRule, ...]) -> None:
 
 
 def test_all_in_an_effect_means_every_entity(rules: RuleSet) -> None:
-    names = [Entity("LeftHand", "hand"), Entity("RightHand", "hand"), Entity("Tomato", "object"), Entity("Bread", "object"), Entity("Rake", "tool")]
+    names = [
+        Entity("LeftHand", "hand"),
+        Entity("RightHand", "hand"),
+        Entity("Tomato", "object"),
+        Entity("Bread", "object"),
+        Entity("Rake", "tool"),
+    ]
     rule = by_name(rules.ground(names), "pull(Tomato,Rake,LeftHand)")
     assert {str(lit) for lit in rule.outcomes[0].literals} == {
         f"reachableWith(Tomato,{e})" for e in ("LeftHand", "RightHand", "Bread", "Rake")

@@ -12,7 +12,9 @@ def look(*objects: ObjectObservation, left: str | None = None, absent: tuple[str
     return Observation(0.0, tuple(objects), hands, absent)
 
 
-def thing(name: str, below: tuple[str, ...] = (), reach: tuple[str, ...] = ("LeftHand",)) -> ObjectObservation:
+def thing(
+    name: str, below: tuple[str, ...] = (), reach: tuple[str, ...] = ("LeftHand",)
+) -> ObjectObservation:
     return ObjectObservation(name, "object", (-0.3, 0.0, 0.0), below, reach)
 
 
