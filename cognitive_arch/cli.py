@@ -15,6 +15,8 @@ import typer
 
 from cognitive_arch.errors import CogArchError, one_line
 
+INTERRUPTED = 130
+
 app = typer.Typer(
     name="cogarch",
     no_args_is_help=True,
@@ -125,12 +127,13 @@ def _guarded() -> int:
     command = typer.main.get_command(app)
     try:
         code = command.main(prog_name="cogarch", standalone_mode=False)
+        if code == INTERRUPTED:  # the argument parser caught Ctrl-C itself
+            return _interrupted()
         return code if isinstance(code, int) else 0
     except CogArchError as error:
         return _complain(str(error))
-    except (KeyboardInterrupt, EOFError):
-        print("interrupted; finished steps are kept, see: cogarch inspect", file=sys.stderr)
-        return 130
+    except KeyboardInterrupt:
+        return _interrupted()
     except BrokenPipeError:
         # The reader of our output went away (cogarch inspect | head); nothing is wrong with the run.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -140,6 +143,11 @@ def _guarded() -> int:
         if message is None:
             raise
         return _complain(message)
+
+
+def _interrupted() -> int:
+    print("interrupted; finished steps are kept, see: cogarch inspect", file=sys.stderr)
+    return INTERRUPTED
 
 
 def _usage_message(error: Exception) -> str | None:

@@ -178,7 +178,6 @@ def run_task(
     started = time.perf_counter()
     setting = Setting.load(config.scene, config.rules)
     task = setting.understand(sentence)
-    progress.on_task(task)
     manifest = {"instruction": task.instruction, **config.to_json(), **task.to_json(), "versions": versions()}
     with RunStore(store_folder, create=True) as store:
         environment = make_environment(
@@ -191,6 +190,7 @@ def run_task(
             record=config.record,
         )
         try:
+            progress.on_task(task)
             with store.begin(f"{setting.scene.name}-{config.backend}-{config.seed}", manifest) as run:
                 actions: list[dict[str, Any]] = []
 

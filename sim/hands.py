@@ -26,8 +26,11 @@ PAD_RADIUS = 0.002  # m, of the small spheres that carry contact
 PAD_STIFFNESS = 5.0e4  # N/m
 FINGER_FRICTION = 1.0
 
-_PAD_ROWS = (0.0025, 0.0085, 0.016, 0.030, 0.045)  # m above the tip
-_PAD_COLUMNS = (-1.0, 0.0, 1.0)
+# Metres above the tip and across the finger. Two columns cradle a round slice: a single middle one would
+# hold it in two points, off which it creeps as soon as it is not met exactly in its diameter. Three rows
+# meet even a slice of 10 mm in two, so that it cannot swing about the line between the fingers.
+_PAD_ROWS = (0.0025, 0.0055, 0.0085, 0.016, 0.030, 0.045)
+_PAD_COLUMNS = (-0.010, 0.010)
 _RUBBER = "0.13 0.14 0.16 1"
 _METAL = "0.62 0.64 0.68 1"
 
@@ -108,7 +111,7 @@ def _add_pads(link: ET.Element, name: str, outward: float, out: float) -> None:
         for column, across in enumerate(_PAD_COLUMNS):
             sphere = ET.SubElement(link, "collision", name=f"{name}_pad_{row}{column}")
             centre = (
-                across * (FINGER_WIDTH / 2 - PAD_RADIUS),
+                across,
                 outward * PAD_RADIUS / 2,
                 out * (FINGER_LENGTH - above),
             )

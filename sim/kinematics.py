@@ -29,9 +29,9 @@ DOWN = np.array([0.0, 0.0, -1.0])
 class HandTarget:
     """What a hand pose must satisfy.
 
-    The point `p_HP` of the hand frame (metres) is to be at `p_WP`; the hand's direction `axis_H` within
-    `tilt` radians of `axis_W`; and, if given, its y axis (along which the fingers close) within
-    `yaw_tolerance` of `fingers_W`.
+    The point `p_HP` of the hand frame (metres) is to be at `p_WP`, give or take `tolerance`; the hand's
+    direction `axis_H` within `tilt` radians of `axis_W`; and, if given, its y axis (along which the
+    fingers close) within `yaw_tolerance` of `fingers_W`.
     """
 
     p_HP: Vector
@@ -41,6 +41,7 @@ class HandTarget:
     tilt: float
     fingers_W: Vector | None = None
     yaw_tolerance: float = 0.08
+    tolerance: float = POSITION_TOLERANCE
 
     def at(self, p_WP: Vector) -> HandTarget:
         """The same demand at another place."""
@@ -82,8 +83,19 @@ class Kinematics:
         frame = self.plant.GetFrameByName(f"{SIDES[hand]}_hand_dh_frame")
         return frame.CalcPoseInWorld(self._context)
 
-    def solve(self, hand: str, target: HandTarget, near: Joints, restarts: int = RESTARTS) -> Joints | None:
+    def solve(
+        self,
+        hand: str,
+        target: HandTarget,
+        near: Joints,
+        *,
+        idle: HandTarget | None = None,
+        restarts: int = RESTARTS,
+    ) -> Joints | None:
         """Joints close to `near` that meet `target`, or None. Fingers keep their position.
+
+        The other arm keeps its joints, or meets `idle` if that is given (it carries something, and a
+        lean of the torso must not lower it onto the table).
 
         Restarts draw from a generator of their own, seeded by the attempt, so that the answer depends on
         the arguments only.
@@ -91,7 +103,7 @@ class Kinematics:
         start = self._full(near)
         lower, upper = self.plant.GetPositionLowerLimits(), self.plant.GetPositionUpperLimits()
         for attempt in range(restarts):
-            problem = self._problem(hand, target, start)
+            problem = self._problem(hand, target, idle, start)
             guess = start
             if attempt:
                 shaken = start + np.random.default_rng(attempt).normal(0, 0.3, len(start))
@@ -103,30 +115,23 @@ class Kinematics:
                 return self._with_fingers_of(near, solution)
         return None
 
-    def _problem(self, hand: str, target: HandTarget, start: Vector) -> InverseKinematics:
+    def _problem(
+        self, hand: str, target: HandTarget, idle: HandTarget | None, start: Vector
+    ) -> InverseKinematics:
         problem = InverseKinematics(self.plant, True)
         world = self.plant.world_frame()
-        frame = self.plant.GetFrameByName(f"{SIDES[hand]}_hand_dh_frame")
-        tolerance = np.full(3, POSITION_TOLERANCE)
-        problem.AddPositionConstraint(
-            frame, target.p_HP, world, target.p_WP - tolerance, target.p_WP + tolerance
-        )
-        problem.AddAngleBetweenVectorsConstraint(frame, target.axis_H, world, target.axis_W, 0, target.tilt)
-        if target.fingers_W is not None:
-            problem.AddAngleBetweenVectorsConstraint(
-                frame, np.array([0.0, 1.0, 0.0]), world, target.fingers_W, 0, target.yaw_tolerance
-            )
-        # A torso lean lowers the idle arm: its hand and both elbows stay clear of the table.
-        floor = self._table_height + HAND_CLEARANCE
-        for other in HANDS:
-            links = [f"{SIDES[other]}_forearm"] + ([f"{SIDES[other]}_hand_dh_frame"] if other != hand else [])
-            for link in links:
-                low, high = np.array([-2.0, -2.0, floor]), np.full(3, 2.0)
-                problem.AddPositionConstraint(self.plant.GetFrameByName(link), np.zeros(3), world, low, high)
+        other = next(h for h in HANDS if h != hand)
+        self._constrain(problem, hand, target)
+        if idle is not None:
+            self._constrain(problem, other, idle)
+        # A torso lean lowers the idle arm: its hand and both forearms stay clear of the table.
+        low, high = np.array([-2.0, -2.0, self._table_height + HAND_CLEARANCE]), np.full(3, 2.0)
+        for link in ("l_forearm", "r_forearm", f"{SIDES[other]}_hand_dh_frame"):
+            problem.AddPositionConstraint(self.plant.GetFrameByName(link), np.zeros(3), world, low, high)
         q, program = problem.q(), problem.get_mutable_prog()
-        idle = SIDES[next(h for h in HANDS if h != hand)]
         for name, index in zip(self._names, self._index, strict=True):
-            if name.startswith(f"{idle}_") or "finger" in name:
+            still = idle is None and name.startswith(f"{SIDES[other]}_")
+            if still or "finger" in name:
                 program.AddBoundingBoxConstraint(start[index], start[index], q[index])
         weights = np.zeros((len(start), len(start)))
         for name, index in zip(self._names, self._index, strict=True):
@@ -134,18 +139,36 @@ class Kinematics:
         program.AddQuadraticErrorCost(weights, start, q)
         return problem
 
+    def _constrain(self, problem: InverseKinematics, hand: str, target: HandTarget) -> None:
+        world = self.plant.world_frame()
+        frame = self.plant.GetFrameByName(f"{SIDES[hand]}_hand_dh_frame")
+        margin = np.full(3, target.tolerance)
+        problem.AddPositionConstraint(frame, target.p_HP, world, target.p_WP - margin, target.p_WP + margin)
+        problem.AddAngleBetweenVectorsConstraint(frame, target.axis_H, world, target.axis_W, 0, target.tilt)
+        if target.fingers_W is not None:
+            problem.AddAngleBetweenVectorsConstraint(
+                frame, np.array([0.0, 1.0, 0.0]), world, target.fingers_W, 0, target.yaw_tolerance
+            )
+
     def _with_fingers_of(self, near: Joints, solution: Joints) -> Joints:
         keep = ["finger" in name for name in self._names]
         return np.where(keep, near, solution)
 
     def line(
-        self, hand: str, target: HandTarget, end: Vector, start: Joints, pieces: int = 4
+        self,
+        hand: str,
+        target: HandTarget,
+        end: Vector,
+        start: Joints,
+        *,
+        idle: HandTarget | None = None,
+        pieces: int = 4,
     ) -> list[Joints] | None:
         """Waypoints of a straight line from `target.p_WP` (where the hand is at `start`) to `end`."""
         path, joints = [], start
         for fraction in np.linspace(0, 1, pieces + 1)[1:]:
             place = target.p_WP + fraction * (end - target.p_WP)
-            step = self.solve(hand, target.at(place), joints, restarts=2)
+            step = self.solve(hand, target.at(place), joints, idle=idle, restarts=2)
             if step is None:
                 return None
             path.append(step)

@@ -8,6 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cognitive_arch.domain import Domain, Scene
+from cognitive_arch.world.observation import HANDS
+from sim.hands import SIDES
 from sim.kinematics import DOWN, HandTarget, Kinematics, Vector, finger_directions, fingertip, palm_axis
 from sim.perception import OraclePerception
 from sim.world import Joints, World
@@ -15,6 +17,7 @@ from sim.world import Joints, World
 APPROACH = 0.09  # m above its target that a hand comes down from
 LEVEL, TILTS = 0.03, (0.05, 0.15, 0.30)  # rad
 YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing direction
+CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may be moved meanwhile
 TRANSIT_SPEED = 0.9  # rad/s of the fastest joint between poses
 
 
@@ -39,11 +42,17 @@ class AimNoise:
 
 @dataclass
 class Grip:
-    """How a hand holds its object: how far the fingers opened before, and the target they close to."""
+    """How a hand holds its object: how far the fingers opened before (metres), the target they close to,
+    the hand yaws that fit the object (radians), and the joints with which the arm carries it."""
 
     opening: float
     closed: float
     yaws: tuple[float, ...]
+    carrying: Joints
+
+
+def _other(hand: str) -> str:
+    return next(h for h in HANDS if h != hand)
 
 
 @dataclass
@@ -72,27 +81,43 @@ class Robot:
             seconds = max(0.6, float(np.abs(np.diff(stops, axis=0)).max(axis=1).sum()) / TRANSIT_SPEED * 1.9)
         self.world.follow([joints, *more], seconds)
 
-    def above(self, hand: str, target: HandTarget) -> HandTarget:
+    def above(self, target: HandTarget) -> HandTarget:
         """The place from which a hand comes down to `target`."""
         return target.at(target.p_WP + np.array([0.0, 0.0, APPROACH]))
 
     def descent(self, hand: str, target: HandTarget) -> tuple[Joints, list[Joints]] | None:
         """Joints above `target` and the waypoints straight down to it, or None if out of reach."""
-        high = self.above(hand, target)
-        start = self.kinematics.solve(hand, high, self.rest(hand))
+        high, idle = self.above(target), self.idle_target(hand)
+        start = self.kinematics.solve(hand, high, self.rest(hand), idle=idle)
         if start is None:
             return None
-        path = self.kinematics.line(hand, high, target.p_WP, start)
+        path = self.kinematics.line(hand, high, target.p_WP, start, idle=idle)
         return None if path is None else (start, path)
 
     def rest(self, hand: str) -> Joints:
-        """The home posture for torso and `hand`, everything else as commanded now.
+        """The home posture for torso and `hand`, the other arm home or carrying, fingers as commanded.
 
         Inverse kinematics starts from here, so that postures do not wander off over many actions.
         """
-        side = "l_" if hand == "LeftHand" else "r_"
-        moves = [n.startswith(("torso", side)) and "finger" not in n for n in self.world.joint_names]
-        return np.where(moves, self.world.home, self.world.command)
+        other = _other(hand)
+        joints = np.where(self._arm_joints(hand, "torso"), self.world.home, self.world.command)
+        if other in self.grips:
+            joints = np.where(self._arm_joints(other), self.grips[other].carrying, joints)
+        return joints
+
+    def _arm_joints(self, hand: str, *more: str) -> list[bool]:
+        prefixes = (f"{SIDES[hand]}_", *more)
+        return [n.startswith(prefixes) and "finger" not in n for n in self.world.joint_names]
+
+    def idle_target(self, hand: str) -> HandTarget | None:
+        """Where the other hand stays, level, while `hand` works; None if it holds nothing."""
+        other = _other(hand)
+        if other not in self.grips:
+            return None
+        X_WH = self.kinematics.hand_pose(other, self.grips[other].carrying)
+        up_W = np.array([0.0, 0.0, 1.0])
+        up_H = X_WH.rotation().inverse() @ up_W
+        return HandTarget(np.zeros(3), X_WH.translation(), up_H, up_W, CARRY_TILT, tolerance=CARRY_TOLERANCE)
 
     def go_home(self, hand: str) -> None:
         """Back to the home posture with one arm, fingers as they are."""

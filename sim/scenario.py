@@ -151,12 +151,10 @@ def object_inertia(spec: ObjectSpec) -> SpatialInertia:
     if isinstance(shape, dom.ToolShape):
         parts = [(X_OP.translation(), part.size) for _, X_OP, part in tool_parts(shape)]
         volumes = [float(np.prod(size)) for _, size in parts]
-        total: SpatialInertia | None = None
+        total = SpatialInertia.Zero()
         for (p_OP, size), volume in zip(parts, volumes, strict=True):
             mass = spec.mass * volume / sum(volumes)
-            part = SpatialInertia(mass, np.zeros(3), UnitInertia.SolidBox(*size)).Shift(-p_OP)
-            total = part if total is None else total + part
-        assert total is not None
+            total += SpatialInertia(mass, np.zeros(3), UnitInertia.SolidBox(*size)).Shift(-p_OP)
         return total
     if isinstance(shape, dom.Cylinder):
         unit = UnitInertia.SolidCylinder(shape.radius, shape.height, [0, 0, 1])

@@ -14,7 +14,7 @@ from sim.robot import YAWS, Grip, Robot
 from sim.skills.base import release
 from sim.world import Joints
 
-TIP_HEIGHT = 0.004  # m of the finger tips above the object's underside
+TIP_HEIGHT = 0.003  # m of the finger tips above the object's underside
 MARGIN = 0.015  # m between each open finger and the object
 SQUEEZE = 0.010  # m that the closing fingers are commanded into the object
 CARRY = {"LeftHand": (-0.24, -0.17), "RightHand": (-0.24, 0.17)}  # m, where a full hand waits
@@ -29,7 +29,7 @@ def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         return obstacle
     aim = robot.noise.draw(hand, robot.rng)
     width, yaws = grip_choices(robot, name)
-    grip = Grip(min(STROKE, width / 2 + MARGIN), max(0.0, width / 2 - SQUEEZE), yaws)
+    grip = Grip(min(STROKE, width / 2 + MARGIN), max(0.0, width / 2 - SQUEEZE), yaws, robot.world.home)
     plan = _plan(robot, name, hand, grip, aim)
     if plan is None:
         return FailureReason.OUT_OF_REACH
@@ -115,9 +115,10 @@ def carry(robot: Robot, hand: str) -> None:
     """Move what the hand holds to where a full hand waits, level, out of the other hand's way."""
     height = robot.scene.table.height + CARRY_HEIGHT
     target = object_target(robot, hand, np.array([*CARRY[hand], height]), None)
-    joints = robot.kinematics.solve(hand, target, robot.rest(hand))
+    joints = robot.kinematics.solve(hand, target, robot.rest(hand), idle=robot.idle_target(hand))
     if joints is not None:
         robot.travel(joints)
+    robot.grips[hand].carrying = robot.world.command
 
 
 def object_target(robot: Robot, hand: str, p_WO: Vector, fingers_W: Vector | None) -> HandTarget:
