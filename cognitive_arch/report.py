@@ -26,7 +26,7 @@ def task_text(task: Task) -> str:
 
 def step_text(record: dict[str, Any]) -> str:
     """One step record on a few lines: what fired and why, what was done, what changed."""
-    lines = [f"        {event['kind']}: {event['why']}" for event in record["events"]]
+    lines = _events(record["events"])
     if record["action"]:
         call = f"{record['action']}({','.join(record['args'])})"
         reason = "" if record["outcome"] == "success" else f" ({record['reason']})"
@@ -42,15 +42,25 @@ def step_text(record: dict[str, Any]) -> str:
     return "\n".join(lines)
 
 
+def _events(events: Sequence[dict[str, str]]) -> list[str]:
+    """One line per event; of a row of horizon extensions only the last says something new."""
+    kinds = [event["kind"] for event in events] + [""]
+    return [
+        f"        {event['kind']}: {event['why']}"
+        for event, following in zip(events, kinds[1:], strict=True)
+        if not event["kind"] == following == "horizon_extended"
+    ]
+
+
 def _brief(sign: str, atoms: Sequence[str]) -> list[str]:
-    """Atoms with a sign; several that differ in the last argument only become one: `-on(Ham,*3)`."""
+    """Atoms with a sign; many that differ in the last argument only become one: `-reachableWith(Ham,*3)`."""
     groups: dict[str, list[str]] = {}
     for atom in atoms:
         groups.setdefault(atom.rpartition(",")[0] or atom, []).append(atom)
-    return [
-        f"{sign}{same[0]}" if len(same) == 1 else f"{sign}{stem},*{len(same)})"
-        for stem, same in groups.items()
-    ]
+    brief = []
+    for stem, same in groups.items():
+        brief += [f"{sign}{stem},*{len(same)})"] if len(same) > 2 else [f"{sign}{atom}" for atom in same]
+    return brief
 
 
 def result_text(result: dict[str, Any]) -> str:

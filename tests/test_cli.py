@@ -62,7 +62,10 @@ def test_parse(cogarch: Any) -> None:
     assert answer.json["subgoals"] == [
         ["inHand(Ham,LeftHand)", "not isClear(LeftHand)"],
         ["on(Ham,Bun-bottom)", "not inHand(Ham,LeftHand)", "isClear(LeftHand)"],
-        ["on(Ham,Bun-bottom)", "not inHand(Ham,LeftHand)", "inHand(Bun-top,LeftHand)", "not isClear(LeftHand)"],
+        [
+            "on(Ham,Bun-bottom)", "not inHand(Ham,LeftHand)", "inHand(Bun-top,LeftHand)",
+            "not isClear(LeftHand)",
+        ],
         [
             "on(Ham,Bun-bottom)", "not inHand(Ham,LeftHand)", "on(Bun-top,Ham)",
             "not inHand(Bun-top,LeftHand)", "isClear(LeftHand)",
