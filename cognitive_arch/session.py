@@ -21,7 +21,8 @@ from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.language.goals import GoalCompiler
 from cognitive_arch.language.instruction import parse_instruction
 from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
-from cognitive_arch.planning.base import Planner, make_planner
+from cognitive_arch.planning.base import Planner
+from cognitive_arch.planning.registry import make_planner
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
 from cognitive_arch.relational.symbols import Goal, GroundAction

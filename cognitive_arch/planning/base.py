@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
 
-from cognitive_arch.errors import PlanningError, unknown
+from cognitive_arch.errors import PlanningError
 from cognitive_arch.relational.rules import GroundRule
 from cognitive_arch.relational.symbols import Goal, GroundAction, State
 
@@ -73,20 +73,3 @@ def check_problem(goal: Goal, horizon: int) -> None:
         raise PlanningError(f"the horizon is {horizon}; valid: 1 or more")
     if not goal:
         raise PlanningError("the goal is empty; a goal has at least one literal")
-
-
-def planners() -> Mapping[str, Callable[[], Planner]]:
-    """Name -> constructor of every planner, with its default settings."""
-    from cognitive_arch.planning.prada import APrada, Prada
-
-    return {"prada": Prada, "a-prada": APrada}
-
-
-PLANNER_NAMES = ("a-prada", "prada")
-
-
-def make_planner(name: str) -> Planner:
-    """The planner called `name`; raises `PlanningError` listing the known ones."""
-    if name not in PLANNER_NAMES:
-        raise PlanningError(unknown("planner", name, PLANNER_NAMES))
-    return planners()[name]()

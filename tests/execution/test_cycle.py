@@ -15,7 +15,7 @@ from cognitive_arch.execution.explain import EndReason
 from cognitive_arch.execution.heuristics import EventKind, Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.symbolic import SymbolicEnvironment
-from cognitive_arch.planning.base import make_planner
+from cognitive_arch.planning.registry import make_planner
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.session import RunConfig, Session, Setting
 from cognitive_arch.world.anchoring import WorldModel
