@@ -187,8 +187,8 @@ def _convert_meshes(robot: ET.Element, source: Path, folder: Path) -> None:
 
 def _add_forearm(link: ET.Element, side: str) -> None:
     capsule = ET.SubElement(link, "collision", name=f"{side}_forearm")
-    along = -hands.PALM_SIGN[side]  # the forearm runs along +x of its frame on the left, -x on the right
-    ET.SubElement(capsule, "origin", xyz=hands.text((along * 0.043, 0, 0.007)), rpy="0 1.5707963 0")
+    away = -1.0 if side == "r" else 1.0
+    ET.SubElement(capsule, "origin", xyz=hands.text((away * 0.043, 0, 0.007)), rpy="0 0 0")
     geometry = ET.SubElement(capsule, "geometry")
     ET.SubElement(geometry, f"{hands.DRAKE}capsule", {key: f"{value:g}" for key, value in FOREARM.items()})
     hands.add_contact(capsule, hands.FINGER_FRICTION)
@@ -205,7 +205,6 @@ def convert(folder: Path) -> Path:
     _motorise(robot)
     links = {link.get("name"): link for link in robot.findall("link")}
     for side in sorted(hands.PALM_SIGN):
-        _add_forearm(links[f"{side}_forearm"], side)
         hands.add_palm(links[f"{side}_hand_dh_frame"], side)
         hands.add_fingers(robot, side)
     urdf = folder / "icub.urdf"
