@@ -49,6 +49,7 @@ class Clause:
     between: list[Mention] = field(default_factory=list)
     using: list[Mention] = field(default_factory=list)
     without: list[Mention] = field(default_factory=list)
+    origin: list[Mention] = field(default_factory=list)
     recipe: str = ""
     hand: str = ""
     joint: str = ""
@@ -140,6 +141,10 @@ def _clause(tree: Tree[Token]) -> Clause:
                 clause.onto.append(_mention(inner[0]))
             case "origin":
                 clause.marks["FROM"] = ""
+                clause.origin.append(_mention(inner[0]))
+            case "from_recipe" if token is not None:
+                clause.marks["FROM"] = ""
+                clause.origin.append(Mention((Word("PRONOUN", str(token)),)))
             case "direct":
                 clause.direct += _mentions(inner[0])
             case role:

@@ -14,6 +14,7 @@ class Make:
     recipe: str
     fillings: tuple[str, ...] = ()
     without: tuple[str, ...] = ()
+    hand: str | None = None
 
 
 @dataclass(frozen=True)

@@ -56,7 +56,7 @@ class Interpreter:
         means: Clause | None = None
         clauses = with_lists_joined(clauses)
         for clause, after in zip(clauses, [*clauses[1:], None], strict=True):
-            if clause.only_means and self._order is not None and self._order.takes(clause):
+            if clause.only_means and self._continues_order(clause, last=after is None):
                 continue
             if clause.only_means and clause is not clauses[-1]:
                 means = clause
@@ -76,25 +76,50 @@ class Interpreter:
         return tuple(self._done)
 
     def _read(self, clause: Clause) -> None:
-        if self._order is not None and self._order.takes(clause):
+        if self._continues_order(clause):
             return
         if "NOT" in clause.marks:
             what = f"not to '{clause.verb_text}'" if clause.verb_text else "what not to do"
             raise InstructionError(f"I was told {what}; say what to do instead")
         verb = clause.verb or self._elliptic_verb(clause)
         if clause.recipe and (verb in _TAKING or verb == "PUT"):
-            verb = "MAKE"
+            verb = self._with_recipe(verb, clause)
         elif verb in ("MAKE", "WANT") and not clause.recipe:
             verb = self._without_recipe(clause)
         if verb == "MAKE":
             self._close_order()
             self._order = Order.begin(clause, self._recipes, self._domain, self._refs)
+            self._order.hand = self._hand(clause)
         else:
             self._close_order()
+            for mention in clause.origin:
+                if mention.kind in ("OBJECT", "TOOL"):
+                    self._refs.there(mention)
             meaning = action_of(verb, clause)
             check_parts(meaning, clause)
             self._handler(meaning, clause)(clause)
         self._verb = verb
+
+    def _continues_order(self, clause: Clause, last: bool = False) -> bool:
+        """Whether `clause` is more about the recipe being ordered, or (`last`) the hand to make it with."""
+        if self._order is None:
+            return False
+        if not self._order.takes(clause) and not (last and clause.hand and not clause.using):
+            return False
+        self._order.done_with(self._hand(clause), clause)
+        return True
+
+    def _with_recipe(self, verb: str, clause: Clause) -> str:
+        """ "get a sandwich" is to make one; "take the ham off the sandwich" is about the one there is."""
+        moved = clause.onto or clause.marks.keys() & {"UP", "DOWN", "AWAY", "CLOSER"}
+        if verb in ("GRASP", "HOLD") or (verb == "PUT" and moved):
+            raise InstructionError(
+                f"I cannot '{clause.verb_text}' a finished {clause.recipe}; I only make one"
+            )
+        if "FROM" in clause.marks and verb in ("GET", "GIVE") and clause.things:
+            clause.recipe = ""  # "take the ham off the cheese sandwich"
+            return verb
+        return "MAKE"
 
     def _is_topic(self, clause: Clause, after: Clause | None) -> bool:
         """ "the ham is too far, pull it closer": the first clause only says what "it" is."""

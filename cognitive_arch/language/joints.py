@@ -44,7 +44,9 @@ def _repair(words: Iterable[Word], verbs: frozenset[str]) -> list[Word]:
             kind = "ATOP"
         elif kind == "FROM" and done and done[-1].kind == "RECIPE":
             kind = "WITH"  # "a sandwich from ham and cheese"
-        elif (kind == "FROM" and not named) or (kind == "WITH" and following in verbs | _AFTER_WITH):
+        elif (kind == "FROM" and not named and following != "RECIPE") or (
+            kind == "WITH" and following in verbs | _AFTER_WITH
+        ):
             kind = ""
         elif kind == "ONLY":
             # As a mark it stands beside the phrase it limits: "with just bread" -> just, with bread.

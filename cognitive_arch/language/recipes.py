@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 from cognitive_arch.domain import Domain, Recipe
 from cognitive_arch.errors import InstructionError
-from cognitive_arch.language.clauses import Clause, Mention
+from cognitive_arch.language.clauses import ANY_HAND, Clause, Mention
 from cognitive_arch.language.commands import Make
 from cognitive_arch.language.references import References
 
+_WEAK = frozenset({",", "and", "but", "also", "plus", "well", "as", "n"})
 _MORE = frozenset({"", "WANT", "PUT", "COVER", "MAKE", "GIVE", "GET"})
 
 
@@ -23,15 +24,22 @@ class Order:
     refs: References
     fillings: list[str] = field(default_factory=list)
     without: list[str] = field(default_factory=list)
+    hand: str | None = None
 
     @classmethod
     def begin(cls, clause: Clause, recipes: Mapping[str, str], domain: Domain, refs: References) -> Order:
         """Start from the clause that names the recipe."""
+        if clause.hand not in ("", ANY_HAND) and clause.marks.keys() & {"ON_HAND", "FROM_HAND"}:
+            raise InstructionError(f"I do not know what the hand has to do with a {clause.recipe}")
         name = recipes[clause.recipe]
         order = cls(name, domain.recipes[name], refs)
         for mark in ("NOT", "CLOSER", "AWAY"):
             if mark in clause.marks:
                 raise InstructionError(f"I cannot make a {clause.recipe} '{clause.marks[mark]}'")
+        if any(m.kind == "OBJECT" for m in clause.origin):
+            raise InstructionError(
+                f"I do not know how 'from {clause.origin[0].text}' goes with a {clause.recipe}"
+            )
         order._add(clause)
         return order
 
@@ -42,7 +50,11 @@ class Order:
     def takes(self, clause: Clause) -> bool:
         """Whether `clause` goes on about this order; if so it is taken in."""
         said = clause.things + clause.using + clause.without + clause.between
-        if clause.recipe or (not said and not clause.marks.keys() & {"OPENFACED"}) or clause.hand:
+        if clause.recipe or (not said and not clause.marks.keys() & {"OPENFACED"}):
+            return False
+        if "FROM" in clause.marks or any(m.kind == "TABLE" for m in clause.onto):
+            return False
+        if clause.verb in ("GET", "GIVE") and not set(clause.joint.split()) <= _WEAK:
             return False
         if any(m.kind == "PRONOUN" for m in clause.things) and clause.verb not in (
             "",
@@ -60,12 +72,37 @@ class Order:
             return True
         if clause.verb not in _MORE or clause.marks.keys() & {"DOWN", "UP", "CLOSER", "AWAY"}:
             return False
+        if not self._is_about_fillings(clause):
+            return False
         self._add(clause)
         return True
 
     def command(self) -> Make:
         """The order as it stands."""
-        return Make(self.name, tuple(self.fillings), tuple(self.without))
+        return Make(self.name, tuple(self.fillings), tuple(self.without), self.hand)
+
+    def done_with(self, hand: str | None, clause: Clause) -> None:
+        """The hand a later clause names is the one for all of it, or the order is refused."""
+        if hand is None or hand == self.hand:
+            return
+        if self.hand is not None or clause.verb not in ("", "MAKE"):
+            raise InstructionError(f"I make a {self.name} with one hand; {hand} was named for a part of it")
+        self.hand = hand
+
+    def _is_about_fillings(self, clause: Clause) -> bool:
+        """Bread is in the recipe anyway; "then put the bottom bun on it" is more than that."""
+        said = [m for m in clause.things + clause.using if m.kind in ("OBJECT", "TOOL")]
+        bread = {n for m in said for n in self.refs.candidates(m)} - {*self.recipe.fillings}
+        if not all(bread.intersection(self.refs.candidates(m)) for m in said) or not said:
+            return True
+        if bread & {*self.without}:
+            return False
+        atop = "ATOP" in clause.marks or bool(clause.onto)
+        return clause.verb in ("", "MAKE", "WANT") or (
+            clause.verb in ("PUT", "COVER")
+            and bread <= {*self.recipe.lid}
+            and (atop or clause.verb == "COVER")
+        )
 
     def _belongs(self, mention: Mention) -> bool:
         if mention.kind in ("OBJECT", "TOOL"):

@@ -64,6 +64,11 @@ class References:
         missing = " or ".join(dict.fromkeys(self.candidates(mention)))
         raise InstructionError(f"there is no {missing} in this scene; it has {', '.join(sorted(self.scene))}")
 
+    def there(self, mention: Mention) -> None:
+        """Raise `InstructionError` unless something `mention` may stand for is in the scene."""
+        if not set(self.candidates(mention)) & set(self.scene):
+            self.named(mention)
+
     def pronoun(self, mention: Mention) -> tuple[str, ...]:
         """What "it" or "them" means: what was acted on last, nothing if nothing was."""
         if mention.text in ("it", "that", "this", "that one"):

@@ -158,7 +158,7 @@ class _Expansion:
         layers = self._layers(command, recipe)
         self._need(*layers)
         for below, layer in pairwise(layers):
-            self._put(layer, below, None)
+            self._put(layer, below, command.hand)
 
     def _layers(self, command: Make, recipe: Recipe) -> list[str]:
         """From the bottom up. What is named must be there; a default only as far as it is."""
