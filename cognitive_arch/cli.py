@@ -5,6 +5,7 @@ Heavy imports stay inside the commands, so that `--help` is quick.
 
 from __future__ import annotations
 
+import io
 import json
 import os
 import sys
@@ -13,13 +14,13 @@ from typing import Annotated, Any
 
 import typer
 
+from cognitive_arch import __version__
 from cognitive_arch.errors import CogArchError, one_line
 
 INTERRUPTED = 130
 
 app = typer.Typer(
     name="cogarch",
-    no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
     pretty_exceptions_enable=False,
@@ -36,6 +37,19 @@ StoreOption = Annotated[
     Path, typer.Option("--store", envvar="COGARCH_STORE", help="Folder where runs are kept.")
 ]
 Sentence = Annotated[str, typer.Argument(help='What to do, for example "make a ham sandwich".')]
+
+
+@app.callback(invoke_without_command=True)
+def options(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", help="Print the version and exit.")] = False,
+) -> None:
+    """Options of the command itself."""
+    if version:
+        print(__version__)
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
 
 
 @app.command()
@@ -115,7 +129,13 @@ def inspect(
 
 
 def _print(data: dict[str, Any], text: str, as_json: bool) -> None:
-    print(json.dumps(data, sort_keys=False, allow_nan=False) if as_json else text)
+    shown = json.dumps(data, sort_keys=False, allow_nan=False) if as_json else text
+    try:
+        if shown:
+            print(shown, flush=True)
+    except BrokenPipeError:
+        # The reader went away (cogarch inspect | head); nothing is wrong with what was done.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def main() -> None:
@@ -124,6 +144,10 @@ def main() -> None:
 
 
 def _guarded() -> int:
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            # What a terminal cannot show (quotes in ASCII, broken bytes) is shown escaped.
+            stream.reconfigure(errors="backslashreplace")
     command = typer.main.get_command(app)
     try:
         code = command.main(prog_name="cogarch", standalone_mode=False)
@@ -134,10 +158,10 @@ def _guarded() -> int:
         return _complain(str(error))
     except KeyboardInterrupt:
         return _interrupted()
-    except BrokenPipeError:
-        # The reader of our output went away (cogarch inspect | head); nothing is wrong with the run.
+    except OSError as error:
+        # Output that cannot be written (a full disk) must not fail once more when Python exits.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+        return _complain(f"cannot write the output: {one_line(error)}")
     except Exception as error:
         message = _usage_message(error)
         if message is None:

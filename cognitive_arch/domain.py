@@ -25,7 +25,7 @@ Name = Annotated[str, Field(pattern=r"^[A-Z][A-Za-z0-9]*(-[A-Za-z0-9]+)*$")]
 
 
 class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Cylinder(_Frozen):
@@ -138,7 +138,7 @@ class Placement(_Frozen):
 class Table(_Frozen):
     """The table's top, metres above the root frame's origin."""
 
-    height: float = -0.096
+    height: Annotated[float, Field(ge=-0.3, le=0.1)] = -0.096
 
 
 class ReachLimits(_Frozen):
@@ -148,14 +148,14 @@ class ReachLimits(_Frozen):
     the right one.
     """
 
-    min_x: float = -0.49
+    min_x: Annotated[float, Field(ge=-2, le=0)] = -0.49
     side: Annotated[float, Field(ge=0)] = 0.15
 
 
 class Scene(_Frozen):
     """One `scenes/*.yaml`: which objects lie where when an episode starts."""
 
-    name: str
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}$")]
     title: str = ""
     domain: str = "sandwich"
     table: Table = Table()
@@ -182,12 +182,7 @@ def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str,
 
 
 def _read_yaml(path: Path, what: str) -> Any:
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise ConfigError(f"no {what} file at {path}") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise ConfigError(f"cannot read the {what} file {path}: {one_line(error)}") from None
+    text = resources.read_text(path, f"{what} file", ConfigError)
     try:
         data = yaml.safe_load(text)
     except (yaml.YAMLError, RecursionError) as error:

@@ -27,6 +27,8 @@ def view(folder: Path, run_id: str | None, step: int | None, format_: str = "tex
     """All runs, one run, or the world at one of its steps; raises `StoreError` or `ConfigError`."""
     if format_ not in FORMATS:
         raise ConfigError(unknown("format", format_, FORMATS))
+    if step is not None and format_ != "text":
+        raise ConfigError("--step shows one step: leave --format away, or use --json")
     if run_id is None and (step is not None or format_ != "text"):
         raise ConfigError("name a run (or 'latest') to see its steps")
     with RunStore(folder) as store:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import sys
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
@@ -80,11 +82,19 @@ def _joined(literals: Sequence[object]) -> str:
     return ", ".join(map(str, literals))
 
 
+class _Terminal(Console):
+    """A console whose reader may go away without ending the run."""
+
+    def on_broken_pipe(self) -> None:
+        self.quiet = True
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
 class LiveProgress:
     """Tells on the terminal what is going on: to stderr when `quiet` leaves stdout to a program."""
 
     def __init__(self, quiet: bool) -> None:
-        self._console = Console(stderr=quiet, highlight=False, soft_wrap=True)
+        self._console = _Terminal(stderr=quiet, highlight=False, soft_wrap=True)
         self._status = Console(stderr=True).status("getting ready")
         self.progress = Progress(on_task=self._task, on_act=self._act, on_step=self._step)
 

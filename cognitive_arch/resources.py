@@ -5,7 +5,10 @@ from __future__ import annotations
 from functools import cache
 from pathlib import Path
 
-from cognitive_arch.errors import ConfigError
+from cognitive_arch.errors import CogArchError, ConfigError, one_line
+
+MAX_BYTES = 1_000_000
+"""Nothing that people write for us is larger; what is larger is not meant for us."""
 
 
 @cache
@@ -29,3 +32,22 @@ def domains_dir() -> Path:
 def grammar_text(name: str) -> str:
     """Text of `grammar/<name>.lark`."""
     return (data_root() / "grammar" / f"{name}.lark").read_text(encoding="utf-8")
+
+
+def read_text(path: Path, what: str, error: type[CogArchError]) -> str:
+    """Text of a file that a person named; raises `error` in one line if it cannot be one.
+
+    Only plain files are opened: a pipe or a device might never end.
+    """
+    if not path.exists():
+        raise error(f"no {what} at '{one_line(path)}'")
+    if not path.is_file():
+        raise error(f"'{one_line(path)}' is not a file; a {what} is needed")
+    try:
+        with path.open("rb") as file:
+            data = file.read(MAX_BYTES + 1)
+        if len(data) > MAX_BYTES:
+            raise error(f"'{one_line(path)}' is too large for a {what}: at most {MAX_BYTES} bytes")
+        return data.decode("utf-8")
+    except (OSError, UnicodeDecodeError) as problem:
+        raise error(f"cannot read the {what} '{one_line(path)}': {one_line(problem)}") from None

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from cognitive_arch.domain import Domain, Scene, load_domain, load_scene
-from cognitive_arch.errors import ConfigError, unknown
+from cognitive_arch.errors import BackendError, ConfigError, RuleError, one_line, unknown
 from cognitive_arch.evaluation.metrics import speed
 from cognitive_arch.execution.backends import BACKENDS, make_environment
 from cognitive_arch.execution.cycle import CycleSettings, EpisodeResult, PlanningCycle, Step
@@ -25,11 +25,21 @@ from cognitive_arch.planning.base import Planner
 from cognitive_arch.planning.registry import make_planner
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
-from cognitive_arch.relational.symbols import Goal, GroundAction
+from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction
 from cognitive_arch.runlog.records import action_record, result_record, versions
 from cognitive_arch.runlog.store import RunStore
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS
+
+CORE_PREDICATES = {
+    "isHand": 1,
+    "isClear": 1,
+    "inHand": 2,
+    "on": 2,
+    "reachableWith": 2,
+    "pullableWith": 2,
+}
+"""What the world state tells of every scene, and with how many arguments."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +50,7 @@ class Task:
     semantic: tuple[SemanticInstruction, ...]
     goals: tuple[Goal, ...]
     alternatives: tuple[tuple[Goal, ...], ...] = ()
+    actions: tuple[str, ...] = ()
 
     def to_json(self) -> dict[str, Any]:
         """The fields of `parse --json`."""
@@ -65,7 +76,25 @@ class Setting:
         """Read scene, domain and rules; `rules` is a file that replaces the domain's own."""
         loaded = load_scene(scene)
         domain = load_domain(loaded.domain)
-        return cls(loaded, domain, load_rules(Path(rules) if rules else domain.rules_path))
+        path = domain.rules_path if rules is None else Path(rules)
+        setting = cls(loaded, domain, load_rules(path))
+        setting._check_rules()
+        return setting
+
+    def _check_rules(self) -> None:
+        """The predicates that observation fills must be the rules' own; constants must be known things."""
+        rules = self.rules
+        for name, arity in CORE_PREDICATES.items():
+            if name in rules.predicates and len(rules.predicates[name].types) != arity:
+                raise RuleError(f"{rules.source}: predicate {name} must have {arity} arguments")
+        known = {*self.domain.objects, *HANDS, ALL, OTHERHAND}
+        for rule in rules.rules:
+            bound = {parameter.name for parameter in rule.parameters}
+            literals = [*rule.context, *(lit for outcome in rule.outcomes for lit in outcome.literals)]
+            for name in (arg for literal in literals for arg in literal.args):
+                if name not in bound | known:
+                    line = f"{rules.source}, line {rule.line}"
+                    raise RuleError(f"{line}: {unknown('entity', name, known)}")
 
     def understand(self, sentence: str, held: Mapping[str, str] | None = None) -> Task:
         """Sentence -> semantic instructions -> sub-goals, given the objects of the scene.
@@ -79,7 +108,8 @@ class Setting:
         semantic = SemanticMemory(self.domain).expand(instruction, names, held or {})
         compiler = GoalCompiler(self.rules)
         goals = compiler.compile(semantic, entities, held)
-        return Task(instruction.sentence, semantic, goals, compiler.alternatives(semantic, entities, held))
+        alternatives = compiler.alternatives(semantic, entities, held)
+        return Task(instruction.sentence, semantic, goals, alternatives, compiler.actions(semantic))
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,8 +127,8 @@ class RunConfig:
     record: bool = True
 
     def __post_init__(self) -> None:
-        if self.seed < 0:
-            raise ConfigError(f"seed {self.seed} is negative; valid: 0 or more")
+        if not 0 <= self.seed < 2**63:
+            raise ConfigError(f"seed {one_line(self.seed, 30)} is out of range; valid: 0 to {2**63 - 1}")
         if not 0 <= self.jitter <= 0.05:
             raise ConfigError(f"jitter {self.jitter:g} m is out of range; valid: 0 to 0.05")
         if self.backend not in BACKENDS:
@@ -180,17 +210,19 @@ def run_task(
     setting = Setting.load(config.scene, config.rules)
     task = setting.understand(sentence)
     manifest = {"instruction": task.instruction, **config.to_json(), **task.to_json(), "versions": versions()}
-    with RunStore(store_folder, create=True) as store:
-        environment = make_environment(
-            config.backend,
-            setting.domain,
-            setting.scene,
-            setting.rules,
-            noise=config.noise,
-            jitter=config.jitter,
-            record=config.record,
-        )
-        try:
+    environment = make_environment(
+        config.backend,
+        setting.domain,
+        setting.scene,
+        setting.rules,
+        noise=config.noise,
+        jitter=config.jitter,
+        record=config.record,
+    )
+    try:
+        _check_skills(task, config.backend, environment)
+        session = Session(config, setting, environment)
+        with RunStore(store_folder, create=True) as store:
             progress.on_task(task)
             with store.begin(f"{setting.scene.name}-{config.backend}-{config.seed}", manifest) as run:
                 actions: list[dict[str, Any]] = []
@@ -201,14 +233,13 @@ def run_task(
                         actions.append(action_record(record))
                     progress.on_step(step)
 
-                session = Session(config, setting, environment)
                 result = session.perform(task, Progress(on_act=progress.on_act, on_step=on_step))
                 artifacts = [str(run.folder / name) for name in environment.save_artifacts(run.folder)]
                 outcome = result_record(result, speed(result.total))
                 outcome["wall_s"] = round(time.perf_counter() - started, 3)
                 run.finish(outcome | {"artifacts": artifacts})
-        finally:
-            environment.close()
+    finally:
+        environment.close()
     return {
         "run_id": run.run_id,
         "instruction": task.instruction,
@@ -224,3 +255,14 @@ def run_task(
         "artifacts": artifacts,
         "store": str(store_folder),
     }
+
+
+def _check_skills(task: Task, backend: str, environment: Environment) -> None:
+    """Refuse at once what the robot of this backend can never do."""
+    missing = [name for name in task.actions if name not in environment.skills]
+    if missing:
+        raise BackendError(
+            f"the {backend} backend has no skill for {', '.join(missing)}; "
+            f"it has {', '.join(sorted(environment.skills))}; other backends: "
+            f"{', '.join(b for b in BACKENDS if b != backend)}"
+        )

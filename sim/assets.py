@@ -205,6 +205,7 @@ def convert(folder: Path) -> Path:
     _motorise(robot)
     links = {link.get("name"): link for link in robot.findall("link")}
     for side in sorted(hands.PALM_SIGN):
+        _add_forearm(links[f"{side}_forearm"], side)
         hands.add_palm(links[f"{side}_hand_dh_frame"], side)
         hands.add_fingers(robot, side)
     urdf = folder / "icub.urdf"

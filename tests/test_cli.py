@@ -160,6 +160,13 @@ BAD = [
     (["run", SANDWICH, "--jitter", "3"], "jitter"),
     (["run", SANDWICH, "--rules", "none.nid"], "none.nid"),
     (["run", SANDWICH, "--store", "/dev/null/x", "--backend", "symbolic"], "run store"),
+    (["run", SANDWICH, "--seed", "9" * 30], "seed"),
+    (["run", SANDWICH, "--rules", ""], "rules file"),
+    (["run", SANDWICH, "--rules", "/dev/zero"], "is not a file"),
+    (["run", SANDWICH, "--scene", "/dev/zero"], "is not a file"),
+    (["run", SANDWICH, "--scene", "/"], "is not a file"),
+    (["run", "pull the ham closer", "--scene", "complex", "--no-record"], "no skill for pull"),
+    (["parse", "hand grasp Ham, LeftHand grasp Bun-top"], "Ham in LeftHand"),
     (["run", SANDWICH, "--frobnicate"], "--frobnicate"),
     (["run"], "sentence"),
     (["fly"], "inspect, parse, run"),
@@ -192,6 +199,11 @@ def test_bad_input_gets_one_line(cogarch: Any, args: list[str], says: str) -> No
         ("{position: [-0.3, 0.1]}", "{}", "objects.Ham.position"),
         ("domain: sandwich", "domain: pizza", "unknown domain 'pizza'"),
         ("name: mine", "title: mine", "name"),
+        ("name: mine", 'name: "a\\0b"', "name"),
+        ("name: mine", "name: a/b", "name"),
+        ("domain: sandwich", "table: {height: .nan}", "table.height"),
+        ("domain: sandwich", "reach: {min_x: .inf}", "reach.min_x"),
+        ("[-0.3, 0.1]}", "[-0.3, 0.1], yaw: .nan}", "objects.Ham"),
     ],
 )
 def test_broken_scene_files(cogarch: Any, tmp_path: Path, old: str, new: str, says: str) -> None:
@@ -214,6 +226,44 @@ def test_own_scene_and_rules_files(cogarch: Any, tmp_path: Path) -> None:
     answer = cogarch("run", SANDWICH, "--rules", str(tmp_path / "broken.nid"))
     assert answer.code == 2
     assert "broken.nid, line 48: the probabilities of putOnWith sum to 1.2" in answer.err
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("predicate on(object, object)", "predicate on(object)", "takes 1 arguments"),
+        ("0.70 on(obj1, obj2)", "0.70 on(obj1, Plate)", "unknown entity 'Plate'"),
+    ],
+)
+def test_rules_that_do_not_fit_the_world(cogarch: Any, tmp_path: Path, old: str, new: str, says: str) -> None:
+    text = load_domain("sandwich").rules_path.read_text()
+    (tmp_path / "my.nid").write_text(text.replace(old, new, 1))
+    answer = cogarch("run", SANDWICH, "--backend", "symbolic", "--rules", str(tmp_path / "my.nid"))
+    assert answer.code == 2
+    assert says in answer.err
+
+
+def test_a_reader_that_goes_away_does_not_end_the_run(tmp_path: Path) -> None:
+    command = f"{sys.executable} -m cognitive_arch.cli"
+    line = f"set -o pipefail; {command} run '{SANDWICH}' --backend symbolic --store {tmp_path} | head -1"
+    done = subprocess.run(["bash", "-c", line], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    listed = subprocess.run(
+        [*command.split(), "inspect", "--store", str(tmp_path), "--json"], capture_output=True, check=True
+    )
+    assert [run["status"] for run in json.loads(listed.stdout)["runs"]] == ["success"]
+
+
+def test_output_that_cannot_be_shown_or_written(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "cognitive_arch.cli", "parse", "please make a “ham” sandwich"]
+    env = os.environ | {"PYTHONIOENCODING": "ascii"}
+    shown = subprocess.run(command, capture_output=True, text=True, check=False, env=env)
+    assert shown.returncode == 0
+    assert "\\u201cham\\u201d" in shown.stdout
+    with open("/dev/full", "w") as full:
+        failed = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert failed.returncode == 2
+    assert len(failed.stderr.strip().splitlines()) == 1
 
 
 def test_a_store_that_is_no_database(cogarch: Any, tmp_path: Path) -> None:

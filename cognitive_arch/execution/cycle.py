@@ -20,6 +20,7 @@ from cognitive_arch.execution.heuristics import (
 from cognitive_arch.planning.base import Planner, PlanResult
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
 from cognitive_arch.relational.symbols import Goal, GroundAction, State, satisfied
+from cognitive_arch.relational.transition import covering_rule
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import Observation
 from cognitive_arch.world.state import StateChange, WorldState
@@ -27,7 +28,7 @@ from cognitive_arch.world.state import StateChange, WorldState
 
 @dataclass(frozen=True, slots=True)
 class CycleSettings:
-    """Published defaults: horizon 5 up to 10, decay 0.2, at most 50 attempted actions.
+    """Horizon 5 up to 10 and decay 0.2 as published; at most 50 attempted actions (t of Sec. 6.4.6.2).
 
     The goal must still hold after `confirm_seconds` in which the robot does nothing.
     """
@@ -203,14 +204,17 @@ class PlanningCycle:
         back to it would undo the jump for ever.
         """
         progress = self._progress
-        while self._heuristics.goal_maintenance and progress.index - 1 in progress.reached:
-            lost = undone(progress.goals[progress.index - 1], progress.goal, state)
+        while self._heuristics.goal_maintenance:
+            last = max((i for i in progress.reached if i < progress.index), default=None)
+            if last is None:
+                return
+            lost = undone(progress.goals[last], progress.goal, state)
             if not lost:
                 return
-            why = f"{', '.join(map(str, lost))} no longer holds: back to sub-goal {progress.index}"
+            why = f"{', '.join(map(str, lost))} no longer holds: back to sub-goal {last + 1}"
             events.append(Event(EventKind.GOAL_MAINTENANCE, why))
-            progress.reached.discard(progress.index - 1)
-            self._move_to(progress.index - 1)
+            progress.reached.discard(last)
+            self._move_to(last)
 
     def _another_way(self, events: list[Event]) -> bool:
         """Creativity: skip a sub-goal that cannot be planned for, or let the other hand try."""
@@ -243,8 +247,8 @@ class PlanningCycle:
         return self._grounded[state.entities]
 
     def _judge(self, action: GroundAction, before: WorldState, after: WorldState) -> bool:
-        rules = {rule.action: rule for rule in self._ground(before)}
-        return action_worked(rules, action, before.atoms(), after.atoms())
+        rule = covering_rule(self._ground(before), action, before.atoms())
+        return action_worked(rule, before.atoms(), after.atoms())
 
     def _adapt(self, action: GroundAction, state: WorldState) -> list[Event]:
         if not self._heuristics.adaptability:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from enum import StrEnum
 
@@ -24,13 +24,14 @@ class EndReason(StrEnum):
 class MissingLiteral:
     """One goal literal that is not true, and what stands in the way of making it so.
 
-    `action` is the action that comes closest to it and `unmet` those of its preconditions that do not
-    hold; without any such action the rules know no way at all.
+    `action` is the action that comes closest to it, `unmet` those of its preconditions that do not hold,
+    `tried` whether it was attempted; without any such action the rules know no way at all.
     """
 
     literal: str
     action: str | None
     unmet: tuple[str, ...]
+    tried: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +56,9 @@ def _way(item: MissingLiteral) -> str:
         return "no rule makes it true with what is here"
     if item.unmet:
         return f"{item.action} would do it, but needs {', '.join(item.unmet)}"
-    return f"{item.action} should do it, but did not work"
+    if item.tried:
+        return f"{item.action} should do it, but did not work"
+    return f"{item.action} would do it, but does not lead to the rest of the goal"
 
 
 def explain_failure(
@@ -67,19 +70,26 @@ def explain_failure(
     tried: Sequence[tuple[GroundAction, bool]],
 ) -> FailureReport:
     """Report on `goal` (number `subgoal`, from 1) in `state`; `tried` are the attempts made for it."""
-    missing = tuple(_missing(literal, state, rules) for literal in goal if not literal.holds(state))
+    missing = tuple(
+        _missing(literal, state, rules, {action for action, _ in tried})
+        for literal in goal
+        if not literal.holds(state)
+    )
     attempts: Counter[GroundAction] = Counter(action for action, _ in tried)
     worked: Counter[GroundAction] = Counter(action for action, ok in tried if ok)
     lines = tuple(f"{a} ({worked[a]} of {n} worked)" for a, n in sorted(attempts.items()))
     return FailureReport(reason, subgoal, missing, lines)
 
 
-def _missing(literal: Literal, state: State, rules: Sequence[GroundRule]) -> MissingLiteral:
+def _missing(
+    literal: Literal, state: State, rules: Sequence[GroundRule], tried: Collection[GroundAction]
+) -> MissingLiteral:
     makers = [rule for rule in rules if rule.outcomes and literal in rule.outcomes[0].literals]
     if not makers:
         return MissingLiteral(str(literal), None, ())
-    best = min(makers, key=lambda rule: (len(_unmet(rule, state)), rule.action))
-    return MissingLiteral(str(literal), str(best.action), tuple(map(str, _unmet(best, state))))
+    best = min(makers, key=lambda rule: (len(_unmet(rule, state)), rule.action not in tried, rule.action))
+    unmet = tuple(map(str, _unmet(best, state)))
+    return MissingLiteral(str(literal), str(best.action), unmet, best.action in tried)
 
 
 def _unmet(rule: GroundRule, state: State) -> list[Literal]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
 
@@ -69,9 +69,9 @@ class Adaptation:
 
     def record(self, action: GroundAction, rules: Sequence[GroundRule]) -> Event:
         """Count one failure of `action`."""
-        before = {rule.action: rule.outcomes[0].probability for rule in self.apply(rules)}
+        mine = [rule for rule in self.apply(rules) if rule.action == action]
         self.failures[action] = self.failures.get(action, 0) + 1
-        old = before.get(action, 0.0)
+        old = max((rule.outcomes[0].probability for rule in mine), default=0.0)
         return Event(
             EventKind.ADAPTABILITY,
             f"{action} failed {_times(self.failures[action])}: its success probability goes "
@@ -102,11 +102,8 @@ def undone(previous: Goal, current: Goal, state: State) -> tuple[Literal, ...]:
     return tuple(lit for lit in current if lit in previous and not lit.holds(state))
 
 
-def action_worked(
-    rules: Mapping[GroundAction, GroundRule], action: GroundAction, before: State, after: State
-) -> bool:
-    """Whether `action` did what it is for: something changed, and all of its first outcome is there."""
-    rule = rules.get(action)
+def action_worked(rule: GroundRule | None, before: State, after: State) -> bool:
+    """Whether an action did what its `rule` is for: something changed, all of its first outcome is there."""
     if rule is None or before == after:
         return False
     return all(literal.holds(after) for literal in rule.outcomes[0].literals)

@@ -23,6 +23,7 @@ from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 
 PULL_DISTANCE = 0.20  # metres that a pull brings an object closer (published)
+TOOL_REACH = 0.30  # metres that a tool adds to the arms' reach
 CLEARANCE = 0.075  # metres between the centres of two things on the table
 
 _REASONS = {
@@ -120,6 +121,11 @@ class SymbolicEnvironment:
         thing = self._things[name]
         return self._xy(thing.support) if thing.support else thing.place
 
+    def _below(self, name: str) -> set[str]:
+        """`name` and everything it rests on."""
+        support = self._things[name].support
+        return {name} | (self._below(support) if support else set())
+
     def _bottom(self, name: str) -> float:
         support = self._things[name].support
         if support is None:
@@ -130,7 +136,9 @@ class SymbolicEnvironment:
         thing, spec = self._things[name], self.domain.objects[name]
         x, y = self._xy(name)
         hands = HANDS if thing.hand else self._arms_reaching(x, y)
-        tools = tuple(t for t in self._things if self.domain.objects[t].kind == "tool" and t != name)
+        tools: tuple[str, ...] = ()
+        if x >= self.scene.reach.min_x - TOOL_REACH:
+            tools = tuple(t for t in self._things if self.domain.objects[t].kind == "tool" and t != name)
         pullers = tuple(t for t in tools if self.domain.objects[t].can_pull)
         return ObjectObservation(
             name=name,
@@ -155,17 +163,17 @@ class SymbolicEnvironment:
         """Why `action` cannot even be tried now, if so."""
         if action.name not in self.skills:
             return FailureReason.UNKNOWN_SKILL
-        if any(arg not in self._things and arg not in HANDS for arg in action.args):
+        if not action.args or action.args[0] not in self._things:
+            return FailureReason.UNKNOWN_OBJECT
+        mine = [rule for rule in self._ground if rule.action == action]
+        named = {arg for rule in mine for lit in rule.outcomes[0].literals for arg in lit.atom.args}
+        if not mine or not named <= {*self._things, *HANDS}:
             return FailureReason.UNKNOWN_OBJECT
         state = self._atoms()
-        for rule in self._ground:
-            if rule.action == action:
-                for literal in rule.context:
-                    if not literal.holds(state):
-                        key = (literal.atom.predicate, literal.positive)
-                        return _REASONS.get(key, FailureReason.NO_EFFECT)
-                return None
-        return FailureReason.UNKNOWN_OBJECT
+        if any(rule.applies(state) for rule in mine):
+            return None
+        missing = next(lit for lit in mine[0].context if not lit.holds(state))
+        return _REASONS.get((missing.atom.predicate, missing.positive), FailureReason.NO_EFFECT)
 
     def _apply(self, rule: GroundRule) -> None:
         """Make the first outcome true: geometry for what geometry decides, properties for the rest."""
@@ -177,13 +185,13 @@ class SymbolicEnvironment:
                 self._things[args[0]] = replace(
                     self._things[args[0]], place=self._xy(args[0]), support=None, hand=args[1]
                 )
-            elif name == "on" and literal.positive:
+            elif name == "on" and literal.positive and args[0] not in self._below(args[1]):
                 self._things[args[0]] = replace(self._things[args[0]], support=args[1], hand=None)
             elif name == "inHand" and args[0] not in placed:
                 self._drop(args[0], args[1])
             elif name == "reachableWith" and args[0] not in moved_by_reach and not self._was_held(rule):
                 moved_by_reach.add(args[0])
-                self._shift(args[0], PULL_DISTANCE if literal.positive else -PULL_DISTANCE)
+                self._shift(args[0], closer=literal.positive)
             elif name not in ("inHand", "on", "isClear", "reachableWith"):
                 change = frozenset({str(literal.atom)})
                 self._properties = (
@@ -195,9 +203,11 @@ class SymbolicEnvironment:
         """Whether the action releases its object (then reach follows from where it is dropped)."""
         return any(lit.atom.predicate == "inHand" for lit in rule.outcomes[0].literals)
 
-    def _shift(self, name: str, dx: float) -> None:
+    def _shift(self, name: str, closer: bool) -> None:
+        """A pull brings a thing closer by a fixed way; a push ends, as its rule says, out of all reach."""
         x, y = self._xy(name)
-        self._things[name] = replace(self._things[name], place=(x + dx, y), support=None)
+        x = x + PULL_DISTANCE if closer else min(x, self.scene.reach.min_x - TOOL_REACH - 0.01)
+        self._things[name] = replace(self._things[name], place=(x, y), support=None)
 
     def _drop(self, name: str, hand: str) -> None:
         self._things[name] = replace(self._things[name], place=self._free_place(name, hand), hand=None)

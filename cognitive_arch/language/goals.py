@@ -50,6 +50,7 @@ class GoalCompiler:
             hand = self._hand(rule, instruction, in_hand, hands)
             ground = self._ground(rule, instruction, reaching, hand, entities)
             effect = ground.outcomes[0].literals
+            _check_hands(instruction, effect, in_hand)
             current = _accumulate(current, effect)
             goals.append(current)
             _track(effect, in_hand)
@@ -71,6 +72,11 @@ class GoalCompiler:
             return ()
         other = self.compile(instructions, entities, held, tuple(reversed(HANDS)))
         return () if other == first else (other,)
+
+    def actions(self, instructions: Sequence[SemanticInstruction]) -> tuple[str, ...]:
+        """Names of the actions whose effects the sub-goals are made of, sorted."""
+        asked = [i for i in instructions if i.verb != REACH]
+        return tuple(sorted({self._match(instruction).action for instruction in asked}))
 
     def _match(self, instruction: SemanticInstruction) -> NIDRule:
         verb = instruction.verb.lower()
@@ -150,6 +156,17 @@ def _accumulate(previous: Goal, effect: Goal) -> Goal:
         return literal.atom not in new and not (place and literal.atom.args[0] in moved)
 
     return tuple(filter(stays, previous)) + effect
+
+
+def _check_hands(instruction: SemanticInstruction, effect: Goal, in_hand: Mapping[str, str]) -> None:
+    """A hand holds one thing: refuse what would ask for two at once."""
+    for literal in effect:
+        if literal.positive and literal.atom.predicate == "inHand":
+            obj, hand = literal.atom.args
+            holding = [held for held, where in in_hand.items() if where == hand and held != obj]
+            if holding:
+                full = ", ".join(f"{held} in {where}" for held, where in sorted(in_hand.items()))
+                raise InstructionError(f"'{instruction}' needs a free hand, but by then there is {full}")
 
 
 def _track(effect: Goal, in_hand: dict[str, str]) -> None:

@@ -12,9 +12,8 @@ from lark.exceptions import UnexpectedInput, UnexpectedToken
 from cognitive_arch.errors import RuleError, one_line, unknown
 from cognitive_arch.relational.rules import LiftedOutcome, NIDRule, Parameter, RuleSet
 from cognitive_arch.relational.symbols import ALL, OTHERHAND, LiftedLiteral, Predicate
-from cognitive_arch.resources import grammar_text
+from cognitive_arch.resources import grammar_text, read_text
 
-MAX_BYTES = 1_000_000
 _PLAIN = {"_NL": "end of line", "LPAR": "(", "RPAR": ")", "COMMA": ",", "_SEP": ",", "COLON": ":"}
 
 
@@ -25,12 +24,7 @@ def _parser() -> Lark:
 
 def load_rules(path: Path) -> RuleSet:
     """Read a rules file; raises `RuleError` if it is missing, too large or malformed."""
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise RuleError(f"{path}: a rules file has at most {MAX_BYTES} bytes")
-        text = path.read_text(encoding="utf-8")
-    except (OSError, UnicodeDecodeError) as error:
-        raise RuleError(f"cannot read the rules file {path}: {one_line(error)}") from None
+    text = read_text(path, "rules file", RuleError)
     return parse_rules(text, str(path))
 
 

@@ -13,7 +13,7 @@ import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from datetime import datetime
+from datetime import UTC, datetime
 from enum import StrEnum
 from pathlib import Path
 from types import TracebackType
@@ -96,7 +96,7 @@ class RunStore:
 
     def begin(self, name: str, manifest: dict[str, Any]) -> RunWriter:
         """Register a new run under an id made of the time and `name`, and return its writer."""
-        now = datetime.now().astimezone()
+        now = datetime.now(UTC)
         stem = f"{now:%Y%m%d-%H%M%S}-{name}"
         for attempt in range(1000):
             run_id = stem if attempt == 0 else f"{stem}-{attempt + 1}"
@@ -106,7 +106,7 @@ class RunStore:
             with self._transaction():
                 self._db.execute(
                     "INSERT INTO runs VALUES (?, ?, ?, NULL)",
-                    (run_id, now.isoformat(timespec="seconds"), json.dumps(manifest, sort_keys=True)),
+                    (run_id, now.isoformat(timespec="microseconds"), json.dumps(manifest, sort_keys=True)),
                 )
             return RunWriter(self, run_id, lock)
         raise StoreError(f"cannot find a free run id for {stem}")
@@ -150,6 +150,8 @@ class RunStore:
         runs = self.runs()
         if name == "latest" and runs:
             return runs[-1]
+        if not name:
+            raise StoreError(unknown("run", name, ["latest"]))
         matching = [r for r in runs if r.run_id == name] or [r for r in runs if r.run_id.startswith(name)]
         if len(matching) == 1:
             return matching[0]

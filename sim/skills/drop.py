@@ -23,8 +23,11 @@ def drop(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     height = robot.scene.table.height + robot.world.height(name) / 2
     for x, y in free_places(robot, name, hand):
         reason = set_down(robot, hand, np.array([x, y, height]))
-        if reason is not FailureReason.OUT_OF_REACH:
-            return reason
+        if reason is FailureReason.OUT_OF_REACH:
+            continue
+        if reason is FailureReason.NONE and ("table", name) not in robot.world.contacts():
+            return FailureReason.MISPLACED
+        return reason
     return FailureReason.OUT_OF_REACH
 
 

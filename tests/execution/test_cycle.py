@@ -16,6 +16,7 @@ from cognitive_arch.execution.heuristics import EventKind, Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.symbolic import SymbolicEnvironment
 from cognitive_arch.planning.registry import make_planner
+from cognitive_arch.relational.parser import parse_rules
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.session import RunConfig, Session, Setting
 from cognitive_arch.world.anchoring import WorldModel
@@ -251,3 +252,44 @@ def test_a_session_keeps_what_is_held_between_instructions() -> None:
     result = session.perform(task)
     assert result.success
     assert result.total == 1
+
+
+def test_push_puts_a_thing_out_of_all_reach() -> None:
+    result, _, world = episode("push the bottom bun away", scene="complex")
+    assert result.success
+    assert sum(a.startswith("push(Bun-bottom") for a in world.log) == 1
+
+
+def test_pull_brings_a_thing_within_reach() -> None:
+    result, _, world = episode("pull the tomato closer", scene="complex")
+    assert result.success
+    assert world.log[-1] == "pull(Tomato,Rake,RightHand)"  # the rake lies on the right
+
+
+def test_several_rules_of_one_action() -> None:
+    """The rule that covers the state judges the action, not the first or the last one in the file."""
+    setting = Setting.load("simple")
+    text = setting.domain.rules_path.read_text()
+    start = text.index("rule graspWith")
+    end = text.index("rule dropWith")
+    grasp = text[start:end]
+    split = grasp.replace("isClear(hand), ", "isClear(hand), isClear(OTHERHAND), ", 1)
+    other = grasp.replace("isClear(hand), ", "isClear(hand), not isClear(OTHERHAND), ", 1)
+    rules = parse_rules(text[:start] + split + other + text[end:])
+    environment = SymbolicEnvironment(setting.domain, setting.scene, rules)
+    task = setting.understand("grasp the ham with the left hand, then the top bun with the right hand")
+    cycle = PlanningCycle(environment, WorldModel(), make_planner("a-prada"), rules, np.random.default_rng(0))
+    result = cycle.run(task.goals, environment.reset(0))
+    assert (result.success, result.good, result.total) == (True, 2, 2)
+
+
+def test_goal_maintenance_looks_past_a_skipped_sub_goal() -> None:
+    def take_away(env: Meddled, n: int) -> None:
+        if n == 6:  # after the failed left grasps of the top, the right hand has it; now the ham goes
+            env._things["Ham"] = replace(env._things["Ham"], support=None, place=(-0.4, 0.1))
+
+    broken = frozenset({"graspWith(Bun-top,LeftHand)"})
+    result, steps, _ = episode(meddle=take_away, broken=broken)
+    assert result.success
+    assert EventKind.CREATIVITY in kinds(steps)
+    assert EventKind.GOAL_MAINTENANCE in kinds(steps)

@@ -93,10 +93,10 @@ def test_undone_looks_at_common_literals_only() -> None:
 
 def test_action_worked(ground: tuple[GroundRule, ...], start: State) -> None:
     grasp = action("graspWith(Ham,LeftHand)")
-    rules = {r.action: r for r in ground}
+    rule = next(r for r in ground if r.action == grasp)
     held = (start - state("isClear(LeftHand)")) | state("inHand(Ham,LeftHand)")
-    assert action_worked(rules, grasp, start, held)
-    assert not action_worked(rules, grasp, start, start)
-    assert not action_worked(rules, grasp, start, start - state("isClear(LeftHand)"))
+    assert action_worked(rule, start, held)
+    assert not action_worked(rule, start, start)
+    assert not action_worked(rule, start, start - state("isClear(LeftHand)"))
     # Already true and still true: nothing changed, so it did not work.
-    assert not action_worked(rules, grasp, held, held)
+    assert not action_worked(rule, held, held)

@@ -14,6 +14,7 @@ from PIL import Image
 
 from cognitive_arch.domain import Domain, load_scene
 from cognitive_arch.execution.environment import FailureReason, Outcome
+from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.session import RunConfig, run_task
 from sim.check import HAND_PAIRS, attempt, sandwich, stacked
 from sim.environment import DrakeEnvironment
@@ -143,11 +144,17 @@ def test_same_seed_same_run_in_two_processes(tmp_path: Path) -> None:
     assert len(digests[0].split()[0]) == hashlib.sha256().digest_size * 2
 
 
-def test_noise_makes_arms_miss_and_the_robot_finds_another_way(tmp_path: Path) -> None:
-    from cognitive_arch.execution.noise import NoiseLevels
+@pytest.mark.parametrize("seed", [6, 7])
+def test_from_a_sentence_to_a_sandwich(tmp_path: Path, seed: int) -> None:
+    result = run_task("make a ham sandwich", RunConfig(seed=seed, jitter=0.02, record=False), tmp_path)
+    assert result["success"]
+    assert {"on(Ham,Bun-bottom)", "on(Bun-top,Ham)"} <= set(result["final_state"])
 
+
+def test_noise_makes_an_arm_miss_and_the_robot_finds_another_way(tmp_path: Path) -> None:
     config = RunConfig(seed=1, noise=NoiseLevels(left=1.0), record=False)
     result = run_task("make a ham sandwich", config, tmp_path)
+    assert result["success"]
     failed = [a for a in result["actions"] if a["outcome"] == "failure"]
     assert failed
     assert {a["reason"] for a in failed} <= {
