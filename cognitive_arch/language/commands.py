@@ -36,10 +36,11 @@ class Put:
 
 @dataclass(frozen=True)
 class Drop:
-    """Let go of a thing, or of whatever the hand holds."""
+    """Let go of a thing, or of whatever the hand holds; `take` is to take it first if it is not held."""
 
     obj: str | None = None
     hand: str | None = None
+    take: bool = False
 
 
 @dataclass(frozen=True)

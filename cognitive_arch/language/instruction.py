@@ -40,8 +40,10 @@ MAX_LENGTH = 500
 
 def offer(domain: Domain, scene_objects: Sequence[str]) -> str:
     """What can be said here, for the end of a message."""
+    tools = {name for name, spec in domain.objects.items() if spec.kind == "tool"}
+    verbs = "grasp, put, drop" + (", pull, push" if tools.intersection(scene_objects) else "")
     return (
-        f"this scene has {', '.join(sorted(scene_objects)) or 'nothing'}; I can grasp, put, drop, pull, push "
+        f"this scene has {', '.join(sorted(scene_objects)) or 'nothing'}; I can {verbs} "
         f"them or make: {', '.join(sorted(domain.recipes)) or 'nothing'}"
     )
 
@@ -56,7 +58,7 @@ def parse_instruction(sentence: str, domain: Domain, scene_objects: Sequence[str
     from cognitive_arch.language.clauses import clauses, verb_kinds, word_lists
     from cognitive_arch.language.interpretation import Interpreter
     from cognitive_arch.language.joints import joined
-    from cognitive_arch.language.vocabulary import Vocabulary
+    from cognitive_arch.language.vocabulary import NothingUnderstood, Vocabulary
 
     if len(sentence) > MAX_LENGTH:
         raise InstructionError(
@@ -69,8 +71,6 @@ def parse_instruction(sentence: str, domain: Domain, scene_objects: Sequence[str
         raise InstructionError(f"the instruction is empty; {choices}")
     try:
         commands = Interpreter(vocabulary, domain, scene_objects).commands(clauses(words))
-    except InstructionError as error:
-        # What is there to choose from is said once, whoever noticed.
-        message = str(error)
-        raise InstructionError(message if "scene" in message else f"{message}; {choices}") from None
+    except NothingUnderstood as error:
+        raise InstructionError(f"{error}; {choices}") from None
     return Instruction(sentence, commands)

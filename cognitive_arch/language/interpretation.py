@@ -23,7 +23,7 @@ from cognitive_arch.language.commands import (
 from cognitive_arch.language.meaning import action_of, check_parts, with_lists_joined
 from cognitive_arch.language.recipes import Order
 from cognitive_arch.language.references import References
-from cognitive_arch.language.vocabulary import Vocabulary, Word
+from cognitive_arch.language.vocabulary import NothingUnderstood, Vocabulary, Word
 
 _TRIPLE_VERBS = {
     "GRASP": "grasp",
@@ -72,7 +72,7 @@ class Interpreter:
                 self._read(clause)
         self._close_order()
         if not self._done:
-            raise InstructionError("nothing was asked for")
+            raise NothingUnderstood("nothing was asked for")
         return tuple(self._done)
 
     def _read(self, clause: Clause) -> None:
@@ -81,6 +81,8 @@ class Interpreter:
         if "NOT" in clause.marks:
             what = f"not to '{clause.verb_text}'" if clause.verb_text else "what not to do"
             raise InstructionError(f"I was told {what}; say what to do instead")
+        if not clause.verb and clause.things and clause.onto and clause.onto[0].text in self._recipes:
+            clause.recipe = clause.onto.pop(0).text  # "ham, then tomato, in a sandwich"
         verb = clause.verb or self._elliptic_verb(clause)
         if clause.recipe and (verb in _TAKING or verb == "PUT"):
             verb = self._with_recipe(verb, clause)
@@ -134,7 +136,7 @@ class Interpreter:
         if clause.recipe:
             return "MAKE"
         if not clause.things and not clause.onto and not clause.using:
-            raise InstructionError("I do not know what to do")
+            raise NothingUnderstood("I do not know what to do")
         # "put ham on the bun and the top bun on it" repeats the verb; "the rake the ham closer" has none.
         if clause.onto or clause.between or "ATOP" in clause.marks:
             return "PUT"
@@ -152,7 +154,7 @@ class Interpreter:
         ):
             return "PUT"  # "bottom bun, ham, top bun" builds it
         said = clause.things[0].text if clause.things else clause.using[0].text
-        raise InstructionError(f"I do not know what to do with '{said}'")
+        raise NothingUnderstood(f"I do not know what to do with '{said}'")
 
     def _without_recipe(self, clause: Clause) -> str:
         """ "I want ham and cheese" orders the one recipe they belong to; "I want the rake" takes it."""
@@ -170,7 +172,7 @@ class Interpreter:
         if clause.things and all(m.kind in ("OBJECT", "TOOL") for m in clause.things):
             said = clause.things[0].text
             raise InstructionError(f"I cannot '{clause.verb_text}' '{said}'")
-        raise InstructionError(f"I do not know what to '{clause.verb_text or 'make'}'")
+        raise NothingUnderstood(f"I do not know what to '{clause.verb_text or 'make'}'")
 
     def _all_of(self, clause: Clause, fillings: Sequence[str]) -> bool:
         said = clause.things + clause.using
@@ -211,7 +213,7 @@ class Interpreter:
         """ "pull the ham, using the rake": the last command gets what comes after the comma."""
         self._close_order()
         if not self._done or isinstance(self._done[-1], Make | Semantic):
-            raise InstructionError("I do not know what to do")
+            raise NothingUnderstood("I do not know what to do")
         last = self._done[-1]
         hand = self._hand(clause)
         if hand is not None:
@@ -225,7 +227,7 @@ class Interpreter:
     def _objects(self, clause: Clause, action: str) -> list[str]:
         names = self._refs.several(clause.things)
         if not names:
-            raise InstructionError(f"I do not know what to {action}")
+            raise NothingUnderstood(f"I do not know what to {action}")
         return names
 
     def _grasp(self, clause: Clause) -> None:
@@ -296,7 +298,8 @@ class Interpreter:
     def _drop(self, clause: Clause) -> None:
         hand = self._hand(clause)
         names = self._refs.several(clause.things)
-        self._done += [Drop(name, hand) for name in names] or [Drop(None, hand)]
+        moved = clause.verb not in ("DROP", "OPEN")  # "put the ham down" moves it wherever it is
+        self._done += [Drop(name, hand, moved) for name in names] or [Drop(None, hand)]
         self._refs.acted_on(*names)
 
     def _tool(self, clause: Clause, objects: list[str]) -> str | None:
@@ -309,6 +312,8 @@ class Interpreter:
     def _move(self, clause: Clause, kind: type[Pull] | type[Push]) -> None:
         names = self._objects(clause, kind.__name__.lower())
         tool, hand = self._tool(clause, names), self._hand(clause)
+        if tool is None and clause.hand == ANY_HAND and "WITH_HAND" in clause.marks:
+            raise InstructionError(f"I {kind.__name__.lower()} things with a tool, not with the hand")
         self._done += [kind(name, tool, hand) for name in names]
         self._refs.acted_on(*names)
 

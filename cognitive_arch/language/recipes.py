@@ -63,7 +63,7 @@ class Order:
             "COVER",
         ):
             return False
-        if not all(self._belongs(m) for m in said) or any(m.kind in ("OBJECT", "TOOL") for m in clause.onto):
+        if not all(self._belongs(m) for m in said) or not self._stays_in_order(clause):
             return False
         # "a sandwich, hold the cheese" leaves it out; "make a sandwich, then hold the cheese" does not.
         held_back = clause.verb == "HOLD" and set(clause.joint.split()) <= {",", ";", "and", "but"}
@@ -74,6 +74,11 @@ class Order:
             return False
         if not self._is_about_fillings(clause):
             return False
+        again = [m.text for m in clause.things for n in self.refs.candidates(m) if n in self.fillings]
+        if clause.verb == "PUT" and again:
+            raise InstructionError(
+                f"'{again[0]}' is in the {self.name} already; name the layers once, from the bottom up"
+            )
         self._add(clause)
         return True
 
@@ -88,6 +93,16 @@ class Order:
         if self.hand is not None or clause.verb not in ("", "MAKE"):
             raise InstructionError(f"I make a {self.name} with one hand; {hand} was named for a part of it")
         self.hand = hand
+
+    def _stays_in_order(self, clause: Clause) -> bool:
+        """A place in a clause: none, or the base for what comes first ("tomato at the bottom, ...")."""
+        places = [m for m in clause.onto if m.kind in ("OBJECT", "TOOL")]
+        if not places or clause.verb:
+            return not places
+        based = all({*self.recipe.base}.intersection(self.refs.candidates(m)) for m in places)
+        if based and self.fillings:
+            raise InstructionError(f"name the layers of the {self.name} once, from the bottom up")
+        return based
 
     def _is_about_fillings(self, clause: Clause) -> bool:
         """Bread is in the recipe anyway; "then put the bottom bun on it" is more than that."""

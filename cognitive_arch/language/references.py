@@ -93,10 +93,10 @@ class References:
         """What something is put on; a bare "bun" is the one that lies below."""
         if mention.kind == "PRONOUN":
             below = self.stack_top or next(iter(self.moved[-1:]), None)
-            if below is None:
+            if below is None and mention.text in self._vocabulary.recipes:
                 below = next((n for n in self.scene if n in self.bases and n not in moving), None)
             if below is None:
-                raise InstructionError(f"I do not know what '{mention.text}' stands for here; name the thing")
+                raise InstructionError(f"I do not know what '{mention.text}' is; name the thing")
             return below
         return self.named(mention, prefer=self.bases, avoid=moving)
 

@@ -73,6 +73,10 @@ class _Expansion:
         self._domain = domain
         self._scene = scene
         self._held = {name: held[name] for name in sorted(held)}
+        self._taken: dict[
+            str, str
+        ] = {}  # by a step of this instruction; what was held before may be put down
+        self._placed: set[str] = set()
         self.steps: list[SemanticInstruction] = []
 
     def offer(self) -> str:
@@ -116,37 +120,65 @@ class _Expansion:
             if hand is not None and holder not in (hand, HAND):
                 raise InstructionError(f"{obj} is in {holder} already, not in {hand}")
             return hand or holder
-        self._step(hand or HAND, "grasp", obj)
-        self._held[obj] = hand or HAND
+        self._take(obj, hand or HAND)
         return hand or HAND
+
+    def _take(self, obj: str, hand: str) -> None:
+        same = [n for n, holder in self._taken.items() if hand != HAND and holder == hand and n != obj]
+        if same:
+            raise InstructionError(
+                f"I have two hands, one thing in each: {hand} holds {same[0]} and cannot take {obj} too"
+            )
+        full = [n for n in self._taken if n != obj]
+        if len(full) > 1:
+            raise InstructionError(
+                f"I have two hands, one thing in each: they hold {' and '.join(full)}, not {obj} too"
+            )
+        self._step(hand, "grasp", obj)
+        self._held[obj] = self._taken[obj] = hand
+
+    def _release(self, obj: str) -> None:
+        self._held.pop(obj, None)
+        self._taken.pop(obj, None)
 
     def _put(self, obj: str, target: str, hand: str | None) -> None:
         self._need(obj, target)
         subject = self._grasp(obj, hand)
         self._step(obj, "reach", target)
         self._step(subject, "put", obj)
-        self._held.pop(obj, None)
+        self._release(obj)
+        self._placed.add(obj)
 
     def _drop(self, command: Drop) -> None:
         obj = self._of_held(command.obj, command.hand, "drop")
         self._need(obj)
+        if obj not in self._held and (command.take or obj in self._placed):
+            self._grasp(obj, command.hand)
         self._step(command.hand or self._held.get(obj, HAND), "drop", obj)
-        self._held.pop(obj, None)
+        self._release(obj)
+        self._placed.discard(obj)
 
     def _move(self, command: Pull | Push) -> None:
         action = "pull" if isinstance(command, Pull) else "push"
         self._need(command.obj)
         tool = command.tool or self._choose_tool(action, command.obj)
         if tool == command.obj:
-            raise InstructionError(f"I cannot {action} {tool} with itself; {self.offer()}")
+            raise InstructionError(f"I cannot {action} {tool} with itself")
+        specs = self._domain.objects
+        if action == "pull" and not specs[tool].can_pull:
+            able = [n for n in specs if n in self._scene and specs[n].can_pull and n != command.obj]
+            other = f"the {able[0]} can" if able else "nothing here can"
+            raise InstructionError(f"the {tool} cannot pull; {other}")
         subject = self._grasp(tool, command.hand)
         self._step(tool, "reach", command.obj)
         self._step(subject, action, command.obj)
 
     def _choose_tool(self, action: str, obj: str) -> str:
-        """One already in a hand, else one that can pull, else any; in the order of the domain."""
+        """One already in a hand, else one that can pull, else (to push) any; in the order of the domain."""
         specs = self._domain.objects
         tools = [n for n, s in specs.items() if s.kind == "tool" and n in self._scene and n != obj]
+        if action == "pull":
+            tools = [n for n in tools if specs[n].can_pull]
         if not tools:
             raise InstructionError(f"there is no tool in this scene to {action} {obj} with; {self.offer()}")
         return min(tools, key=lambda n: (n not in self._held, not specs[n].can_pull))
@@ -164,9 +196,7 @@ class _Expansion:
         """From the bottom up. What is named must be there; a default only as far as it is."""
         left_out = [n for n in recipe.base if n in command.without]
         if left_out:
-            raise InstructionError(
-                f"a {command.recipe} needs {left_out[0]}, it cannot go without; {self.offer()}"
-            )
+            raise InstructionError(f"a {command.recipe} needs {left_out[0]}, it cannot go without")
         fillings = command.fillings or self._default(recipe)
         kept = [n for n in fillings if n not in command.without]
         if not kept and not command.without:
@@ -185,8 +215,9 @@ class _Expansion:
             if verb not in VERBS:
                 raise InstructionError(unknown("verb", verb, VERBS))
             self._need(obj)
-            self._step(subject, verb, obj)
             if verb == "grasp":
-                self._held[obj] = subject
-            elif verb in ("put", "drop"):
-                self._held.pop(obj, None)
+                self._take(obj, subject)
+                continue
+            self._step(subject, verb, obj)
+            if verb in ("put", "drop"):
+                self._release(obj)

@@ -30,6 +30,10 @@ _REFUSED = {
 _HARMLESS_SYMBOLS = re.compile(r"FACE|HEART|HAND|THUMB|SIGN|SPARKLE|ROBOT|SMIL|STAR|PARTY|FINGER|FITZPATRICK")
 
 
+class NothingUnderstood(InstructionError):
+    """Something was left out altogether: the line ends with what can be said in this scene."""
+
+
 @dataclass(frozen=True)
 class Word:
     """A phrase of the sentence with the grammar's terminal it stands for."""
@@ -146,7 +150,7 @@ class Vocabulary:
             named = determined[at] or not self.verbs.isdisjoint(after)  # "stick reaches ham"
             kind = self._choose(phrase, found, named)
             if kind in _REFUSED:
-                raise InstructionError(f"{_REFUSED[kind]}, not '{' '.join(phrase)}'; {offer}")
+                raise InstructionError(f"{_REFUSED[kind]}, not '{' '.join(phrase)}'")
             if kind not in _SILENT:
                 found.append(Word(kind, " ".join(phrase)))
             at += len(phrase)
@@ -197,5 +201,6 @@ class Vocabulary:
             (p if _DOMAIN_KINDS & k.keys() else p[:1]) for p, k in self._kinds.items() if telling & k.keys()
         ]
         names = {w for p in said for w in p if len(w) > 2} - self._run_together
-        near = difflib.get_close_matches(word[:60], sorted(names - {word}), n=1, cutoff=0.6)
+        swapped = sorted(n for n in names - {word} if sorted(n) == sorted(word))
+        near = swapped or difflib.get_close_matches(word[:60], sorted(names - {word}), n=1, cutoff=0.72)
         return f"'{one_line(word, 40)}'" + (f" (did you mean '{near[0]}'?)" if near else "")

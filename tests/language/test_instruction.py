@@ -149,8 +149,8 @@ def test_what_is_held_is_not_grasped_again() -> None:
         "Ham reach Bun-bottom",
         "LeftHand put Ham",
     ]
-    assert _expand("pull the ham", COMPLEX, {"Stick": "RightHand"}) == [
-        "Stick reach Ham",
+    assert _expand("pull the ham", COMPLEX, {"Rake": "RightHand"}) == [
+        "Rake reach Ham",
         "RightHand pull Ham",
     ]
 
@@ -186,3 +186,31 @@ def test_a_domain_brings_its_own_words() -> None:
 
 def test_semantic_instruction_reads_as_a_sentence() -> None:
     assert str(SemanticInstruction("hand", "grasp", "Ham")) == "hand grasp Ham"
+
+
+def _refusal(sentence: str, scene: tuple[str, ...]) -> str:
+    with pytest.raises(InstructionError) as caught:
+        parse_instruction(sentence, DOMAIN, scene)
+    return str(caught.value)
+
+
+def test_what_there_is_is_told_only_where_something_is_unknown() -> None:
+    assert "this scene has" not in _refusal("do not grasp the ham", KITCHEN)
+    assert "I can grasp, put, drop them" in _refusal("grasp the hma", KITCHEN)
+    assert "I can grasp, put, drop, pull, push them" in _refusal("grasp the hma", COMPLEX)
+
+
+def test_a_word_is_suggested_only_if_it_is_close() -> None:
+    assert "did you mean 'ham'" in _refusal("grasp the hma", KITCHEN)
+    assert "did you mean" not in _refusal("where is the ham", KITCHEN)
+
+
+def test_what_is_held_before_counts_for_no_hand() -> None:
+    held = {"Ham": "LeftHand", "Cheese": "RightHand"}
+    assert _expand("grasp the tomato", KITCHEN, held) == ["hand grasp Tomato"]
+    assert _expand("put the ham down", KITCHEN, held) == ["LeftHand drop Ham"]
+
+
+def test_a_recipe_keeps_the_hand_it_is_to_be_made_with() -> None:
+    made = parse_instruction("make a ham sandwich with your right hand", DOMAIN, KITCHEN)
+    assert made.commands == (Make("sandwich", ("Ham",), (), "RightHand"),)
