@@ -90,10 +90,19 @@ class Interpreter:
             verb = self._without_recipe(clause)
         if verb == "MAKE":
             self._close_order()
+            if any(
+                isinstance(done, Make) and done.recipe == self._recipes[clause.recipe] for done in self._done
+            ):
+                raise InstructionError(f"I make one {clause.recipe}; there is one of each thing for it")
             self._order = Order.begin(clause, self._recipes, self._domain, self._refs)
             self._order.hand = self._hand(clause)
         else:
             self._close_order()
+            made = self._done[-1] if self._done else None
+            if isinstance(made, Make) and any(m.kind == "PRONOUN" for m in clause.things):
+                raise InstructionError(
+                    f"I cannot '{clause.verb_text or verb.lower()}' a finished {made.recipe}"
+                )
             for mention in clause.origin:
                 if mention.kind in ("OBJECT", "TOOL"):
                     self._refs.there(mention)
