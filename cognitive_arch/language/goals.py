@@ -50,7 +50,9 @@ class GoalCompiler:
             hand = self._hand(rule, instruction, in_hand, hands)
             ground = self._ground(rule, instruction, reaching, hand, entities)
             effect = ground.outcomes[0].literals
-            _check_hands(instruction, effect, in_hand)
+            # What was held before may be put down on the way; what this instruction takes may not.
+            taken = {obj: where for obj, where in in_hand.items() if obj not in (held or {})}
+            _check_hands(instruction, effect, taken)
             current = _accumulate(current, effect)
             goals.append(current)
             _track(effect, in_hand)
