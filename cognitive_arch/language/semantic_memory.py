@@ -83,6 +83,7 @@ class _Expansion:
         return f"this scene has {', '.join(sorted(self._scene)) or 'nothing'}"
 
     def add(self, command: Command) -> None:
+        """Append the steps of one command."""
         match command:
             case Make():
                 self._make(command)

@@ -95,6 +95,7 @@ class _Builder:
             raise self.fail(line, unknown("type", type_, self.types))
 
     def rule(self, node: Tree[Any]) -> None:
+        """Check one rule and add it."""
         name, parameters, *outcomes = node.children
         context = outcomes.pop(0) if node.data == "rule" else None
         params = tuple(Parameter(*map(str, p.children)) for p in parameters.children) if parameters else ()

@@ -41,7 +41,7 @@ PHRASES = sorted(
 )
 
 
-def _survives(sentence: str, scene: tuple[str, ...]) -> None:
+def check_survives(sentence: str, scene: tuple[str, ...]) -> None:
     start, message = time.perf_counter(), ""
     try:
         first = parse_instruction(sentence, DOMAIN, scene)
@@ -56,7 +56,7 @@ def _survives(sentence: str, scene: tuple[str, ...]) -> None:
 @settings(max_examples=300, deadline=None)
 @given(st.text(max_size=MAX_LENGTH + 20))
 def test_any_text_is_understood_or_refused(text: str) -> None:
-    _survives(text, KITCHEN)
+    check_survives(text, KITCHEN)
 
 
 @settings(max_examples=1000, deadline=None)
@@ -64,7 +64,7 @@ def test_any_text_is_understood_or_refused(text: str) -> None:
 def test_any_sequence_of_known_words_is_understood_or_refused(
     words: list[str], scene: tuple[str, ...]
 ) -> None:
-    _survives(" ".join(words), scene)
+    check_survives(" ".join(words), scene)
 
 
 @pytest.mark.parametrize(

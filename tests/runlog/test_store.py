@@ -64,6 +64,40 @@ def test_killed_at_random_moments(tmp_path: Path) -> None:
     assert len(interrupted) >= 15
 
 
+def test_killed_before_it_got_to_work(tmp_path: Path) -> None:
+    """While it starts, opens the store or begins the run: the store is absent or opens clean."""
+    rng = random.Random(5)
+    for _ in range(8):
+        process = start(tmp_path)
+        time.sleep(rng.uniform(0.3, 1.3))
+        process.kill()
+        process.wait()
+        if (tmp_path / "runs.sqlite3").exists():
+            with RunStore(tmp_path) as store:
+                for run in store.runs():
+                    steps = store.steps(run.run_id)
+                    assert [s["step"] for s in steps] == list(range(1, len(steps) + 1))
+    process = start(tmp_path)
+    process.communicate()
+    with RunStore(tmp_path) as store:
+        assert store.runs()[-1].status is RunStatus.FAILURE
+
+
+@pytest.mark.physics
+def test_a_killed_drake_run_keeps_its_finished_steps(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "cognitive_arch.cli", "run", "make a ham sandwich", "--no-record"]
+    process = subprocess.Popen([*command, "--store", str(tmp_path)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout is not None
+    while not process.stdout.readline().startswith("step 2"):
+        assert process.poll() is None
+    process.kill()
+    process.wait()
+    with RunStore(tmp_path) as store:
+        (run,) = store.runs()
+        assert run.status is RunStatus.INTERRUPTED
+        assert [s["action"] for s in store.steps(run.run_id)] == ["graspWith", "putOnWith"]
+
+
 def test_inspect_shows_the_interruption(tmp_path: Path) -> None:
     process = start(tmp_path)
     assert process.stdout is not None
