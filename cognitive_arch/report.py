@@ -10,7 +10,6 @@ from typing import Any
 
 from rich.console import Console
 from rich.markup import escape
-from rich.status import Status
 
 from cognitive_arch.execution.cycle import Step
 from cognitive_arch.relational.symbols import GroundAction
@@ -111,10 +110,6 @@ class LiveProgress:
     @property
     def _animated(self) -> bool:
         return Console(stderr=True).is_terminal
-
-    @property
-    def status(self) -> Status:
-        return self._status
 
     def _task(self, task: Task) -> None:
         self._console.print(escape(task_text(task)))

@@ -15,7 +15,7 @@ from sim.pictures import Photographer
 from sim.robot import AimNoise, Robot
 from sim.scenario import FRICTION
 from sim.skills import SKILLS
-from sim.skills.base import unusable_arguments
+from sim.skills.base import let_go_of_lost, unusable_arguments
 from sim.world import World
 
 SETTLE = 0.3  # s before the first look
@@ -79,6 +79,7 @@ class DrakeEnvironment:
         wrong = unusable_arguments(self.robot, action, entry.n_objects)
         if wrong is not None:
             return SkillResult(Outcome.FAILURE, wrong)
+        let_go_of_lost(self.robot)
         started, name = self.world.time, action.args[0]
         before = self.world.pose(name).translation()
         reason = entry.perform(self.robot, action.args)

@@ -112,11 +112,6 @@ class World:
         measured: Joints = self.plant.GetPositions(self._plant_context)[self._positions]
         return measured
 
-    def state(self) -> Joints:
-        """Positions and velocities of everything, for comparison of whole runs."""
-        vector: Joints = self.plant.GetPositionsAndVelocities(self._plant_context).copy()
-        return vector
-
     def contacts(self) -> frozenset[tuple[str, str]]:
         """Names of the bodies that press on each other now, each pair in both orders."""
         results = self.plant.get_contact_results_output_port().Eval(self._plant_context)

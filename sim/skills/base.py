@@ -23,6 +23,17 @@ def unusable_arguments(robot: Robot, action: GroundAction, n_objects: int) -> Fa
     return None if set(objects) <= seen else FailureReason.UNKNOWN_OBJECT
 
 
+def let_go_of_lost(robot: Robot) -> None:
+    """Open and bring home every hand whose object has slipped away since it was grasped.
+
+    Otherwise the arm would go on being kept level for something it no longer carries.
+    """
+    for hand in sorted(robot.grips):
+        if robot.perception.held(hand) is None:
+            release(robot, hand, robot.grips[hand].opening)
+            robot.go_home(hand)
+
+
 def release(robot: Robot, hand: str, opening: float) -> None:
     """Open the hand where it is and forget the grip."""
     robot.world.move_fingers(hand, opening)

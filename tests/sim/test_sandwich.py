@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from pydrake.math import RigidTransform
 
 from cognitive_arch.domain import Domain, load_scene
 from cognitive_arch.execution.environment import FailureReason, Outcome
@@ -82,6 +83,21 @@ def test_both_hands_full(simple: DrakeEnvironment) -> None:
     for call in ("putOnWith(Ham,Bun-bottom,LeftHand)", "putOnWith(Bun-top,Ham,RightHand)"):
         assert simple.execute(action(call)).outcome is Outcome.SUCCESS, call
     assert stacked(simple)
+
+
+def test_a_hand_that_lost_its_object_is_free_again(simple: DrakeEnvironment) -> None:
+    simple.reset(2)
+    assert simple.execute(action("graspWith(Ham,LeftHand)")).outcome is Outcome.SUCCESS
+    world = simple.world
+    plant = world.plant
+    place = RigidTransform([-0.35, 0.2, world.scene.table.height + 0.006])
+    context = plant.GetMyMutableContextFromRoot(world.simulator.get_mutable_context())
+    plant.SetFreeBodyPose(context, world.scenario.objects["Ham"], place)
+    simple.settle(0.2)
+    assert [hand.holding for hand in simple.observe().hands] == [None, None]
+    assert simple.execute(action("graspWith(Bun-top,LeftHand)")).outcome is Outcome.SUCCESS
+    assert sorted(simple.robot.grips) == ["LeftHand"]
+    assert simple.execute(action("graspWith(Ham,RightHand)")).outcome is Outcome.SUCCESS
 
 
 def test_nothing_sinks_into_anything_and_joints_stay_in_their_limits(domain: Domain) -> None:
