@@ -7,11 +7,12 @@ scene. The noise outcome is kept apart as the probability mass that no listed ou
 from __future__ import annotations
 
 import itertools
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 from cognitive_arch.errors import GroundingError, unknown
+from cognitive_arch.relational.derived import Definition
 from cognitive_arch.relational.symbols import (
     ALL,
     OTHERHAND,
@@ -78,6 +79,26 @@ class GroundRule:
         """The same rule with another probability of its first outcome; the rest goes to noise."""
         first = replace(self.outcomes[0], probability=probability)
         return replace(self, outcomes=(first, *self.outcomes[1:]))
+
+
+class GroundRules(tuple[GroundRule, ...]):
+    """Ground rules together with the definitions of the derived atoms that their contexts speak of.
+
+    It is a tuple of rules, so that whoever has no derived atoms need not know of them.
+    """
+
+    derived: tuple[Definition, ...]
+
+    def __new__(cls, rules: Iterable[GroundRule] = (), derived: tuple[Definition, ...] = ()) -> GroundRules:
+        """`derived` in the order of `derived.in_order`."""
+        made = super().__new__(cls, rules)
+        made.derived = derived
+        return made
+
+
+def derived_of(rules: Sequence[GroundRule]) -> tuple[Definition, ...]:
+    """The definitions that `rules` carry, if any."""
+    return rules.derived if isinstance(rules, GroundRules) else ()
 
 
 @dataclass(frozen=True, slots=True)
