@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field, fields
 from enum import StrEnum
 
 from cognitive_arch.errors import ConfigError, unknown
-from cognitive_arch.relational.rules import GroundRule
+from cognitive_arch.relational.rules import GroundRule, GroundRules, derived_of
 from cognitive_arch.relational.symbols import Goal, GroundAction, Literal, State
 
 
@@ -82,11 +82,12 @@ class Adaptation:
         """Forget all failures."""
         self.failures.clear()
 
-    def apply(self, rules: Sequence[GroundRule]) -> tuple[GroundRule, ...]:
-        """`rules` with the lowered probabilities."""
+    def apply(self, rules: Sequence[GroundRule]) -> Sequence[GroundRule]:
+        """`rules` with the lowered probabilities; they themselves if nothing has failed."""
         if not self.failures:
-            return tuple(rules)
-        return tuple(_lowered(rule, self.decay ** self.failures.get(rule.action, 0)) for rule in rules)
+            return rules
+        lowered = (_lowered(rule, self.decay ** self.failures.get(rule.action, 0)) for rule in rules)
+        return GroundRules(lowered, derived_of(rules))
 
 
 def _lowered(rule: GroundRule, factor: float) -> GroundRule:

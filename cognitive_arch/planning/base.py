@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
@@ -10,8 +11,9 @@ from typing import Protocol
 import numpy as np
 
 from cognitive_arch.errors import PlanningError
+from cognitive_arch.planning.problem import Problem, compile_problem
 from cognitive_arch.relational.rules import GroundRule
-from cognitive_arch.relational.symbols import Goal, GroundAction, State
+from cognitive_arch.relational.symbols import DO_NOTHING, Goal, GroundAction, State
 
 
 class PlanStatus(StrEnum):
@@ -26,8 +28,8 @@ class PlanResult:
     """The best sequence found.
 
     `value` is the discounted sum of goal probabilities over steps 0..horizon, `goal_probability` the
-    highest probability of the goal along the sequence. Without a plan `actions` is empty and the numbers
-    are those of doing nothing.
+    highest probability of the goal along the sequence, both as the planner estimates them. Without a plan
+    `actions` is empty and the numbers are those of doing nothing.
     """
 
     status: PlanStatus
@@ -62,9 +64,33 @@ class Planner(Protocol):
     ) -> PlanResult:
         """Find a sequence of at most `horizon` actions that makes `goal` likely, starting from `state`.
 
+        Derived atoms of `state` are worked out from the definitions that `rules` carry, if any.
         Raises `PlanningError` if `horizon` is below 1 or `goal` is empty.
         """
         ...
+
+
+class ArrayPlanner(ABC):
+    """A planner that works on a compiled `Problem`; all of ours do.
+
+    Whoever plans more than once for one state and goal compiles the problem himself and calls `solve`.
+    """
+
+    def plan(
+        self,
+        state: State,
+        goal: Goal,
+        rules: Sequence[GroundRule],
+        horizon: int,
+        rng: np.random.Generator,
+    ) -> PlanResult:
+        """See `Planner.plan`."""
+        check_problem(goal, horizon)
+        return self.solve(compile_problem(state, goal, rules), horizon, rng)
+
+    @abstractmethod
+    def solve(self, problem: Problem, horizon: int, rng: np.random.Generator) -> PlanResult:
+        """Plan in a compiled problem."""
 
 
 def check_problem(goal: Goal, horizon: int) -> None:
@@ -73,3 +99,12 @@ def check_problem(goal: Goal, horizon: int) -> None:
         raise PlanningError(f"the horizon is {horizon}; valid: 1 or more")
     if not goal:
         raise PlanningError("the goal is empty; a goal has at least one literal")
+
+
+def named_actions(problem: Problem, sequence: Sequence[int]) -> tuple[GroundAction, ...]:
+    """The actions behind their numbers, without doing nothing at the end."""
+    names = [*problem.actions, DO_NOTHING]
+    actions = [names[i] for i in sequence]
+    while actions and actions[-1] == DO_NOTHING:
+        actions.pop()
+    return tuple(actions)

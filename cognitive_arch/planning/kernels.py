@@ -1,159 +1,395 @@
 """Inner loops of PRADA, compiled once per machine.
 
-All kernels take the arrays of `Problem.arrays()` first. Beliefs are marginals per atom; one step changes
-only the atoms its rules affect:  P' = P + sum over rules r of w_r (set_r - change_r P),  which is the
-published  P' = (1 - w_a) P + sum w_r [set_r + (1 - change_r) P]  without the cancelling terms.
+Beliefs are marginals per atom, held per literal (see `problem`). One step changes only the atoms its rules
+affect:  P' = P + sum over rules r of w_r (set_r - change_r P),  which is the published
+P' = (1 - w_a) P + sum w_r [set_r + (1 - change_r) P]  without the cancelling terms. After a step only
+the rules whose context reads a changed atom are weighed again, each afresh from its context, so that a
+sequence has the same value whatever was evaluated before it.
 """
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
+from numpy.typing import NDArray
+
+BLOCK = 32
+"""Actions per block: the masses of a block are summed again only if one of them changed."""
+
+CLOSURE_CUT = 0.01
+"""Chains less likely than this are not followed any further (as in libPRADA)."""
+
+ATOMS, RULES, ACTIONS, ROUND = range(4)
+"""Which entry of `Scratch.length` holds the length of which trail, and the running number of the refresh."""
+
+
+class Scratch(NamedTuple):
+    """What one thread needs to propagate beliefs.
+
+    `prob` (2 * n_atoms,) holds the belief per literal; `own` (n_rules,) the context probabilities, `weight`
+    (n_rules,) the same times that of no sibling rule applying, `mass` (n_actions,) what an action is
+    sampled in proportion to, `block` its sums. The trails list what was changed, and from what, so that
+    `undo` can take it back; the stamps say what a refresh has already seen.
+    """
+
+    prob: NDArray[np.float64]
+    own: NDArray[np.float64]
+    weight: NDArray[np.float64]
+    mass: NDArray[np.float64]
+    block: NDArray[np.float64]
+    delta: NDArray[np.float64]
+    atoms: NDArray[np.int32]
+    atoms_old: NDArray[np.float64]
+    rules: NDArray[np.int32]
+    rules_old: NDArray[np.float64]
+    actions: NDArray[np.int32]
+    rule_stamp: NDArray[np.int64]
+    action_stamp: NDArray[np.int64]
+    length: NDArray[np.int64]
 
 
 @numba.njit(cache=True, nogil=True)
-def _rule_weights(action_ptr, context_ptr, context_atom, context_sign, belief, threshold, weights):  # type: ignore[no-untyped-def]
-    """Fill `weights` (n_rules,): context probability, cut below `threshold`, and no sibling applies."""
-    for rule in range(len(context_ptr) - 1):
-        weight = 1.0
-        for k in range(context_ptr[rule], context_ptr[rule + 1]):
-            p = belief[context_atom[k]]
-            weight *= p if context_sign[k] == 1 else 1.0 - p
-            if weight < threshold:
-                weight = 0.0
-                break
-        weights[rule] = weight
-    for action in range(len(action_ptr) - 1):
-        start, stop = action_ptr[action], action_ptr[action + 1]
-        if stop - start > 1:
-            own = weights[start:stop].copy()
-            for i in range(stop - start):
-                for j in range(stop - start):
-                    if j != i:
-                        weights[start + i] *= 1.0 - own[j]
+def make_scratch(p, threshold, horizon):  # type: ignore[no-untyped-def]
+    """Scratch space for sequences of `horizon` actions, with everything weighed at step 0."""
+    n_atoms, n_rules, n_actions = len(p.start) // 2, len(p.rule_action), len(p.action_ptr) - 1
+    s = Scratch(
+        p.start.copy(),
+        np.empty(n_rules),
+        np.empty(n_rules),
+        np.empty(n_actions),
+        np.empty(n_actions // BLOCK + 1),
+        np.zeros(n_atoms),
+        np.empty(horizon * n_atoms, np.int32),
+        np.empty(horizon * n_atoms),
+        np.empty(horizon * n_rules, np.int32),
+        np.empty(horizon * n_rules),
+        np.empty(horizon * n_actions, np.int32),
+        np.zeros(n_rules, np.int64),
+        np.zeros(n_actions, np.int64),
+        np.zeros(4, np.int64),
+    )
+    for rule in range(n_rules):
+        s.own[rule] = _context_probability(p, s.prob, rule, threshold)
+    for action in range(n_actions):
+        _weigh_action(p, s, action)
+    for b in range(len(s.block)):
+        _sum_block(s, b)
+    return s
 
 
-@numba.njit(cache=True, nogil=True)
-def _advance(action, action_ptr, effect_ptr, effect_atom, effect_set, effect_change, weights, belief, delta):  # type: ignore[no-untyped-def]
-    """Propagate `belief` (n_atoms,) in place through `action`; `delta` is scratch of the same shape."""
-    start, stop = action_ptr[action], action_ptr[action + 1]
-    for rule in range(start, stop):
-        for k in range(effect_ptr[rule], effect_ptr[rule + 1]):
-            delta[effect_atom[k]] = 0.0
-    for rule in range(start, stop):
-        if weights[rule] > 0.0:
-            for k in range(effect_ptr[rule], effect_ptr[rule + 1]):
-                atom = effect_atom[k]
-                delta[atom] += weights[rule] * (effect_set[k] - effect_change[k] * belief[atom])
-    for rule in range(start, stop):
-        for k in range(effect_ptr[rule], effect_ptr[rule + 1]):
-            atom = effect_atom[k]
-            belief[atom] = min(1.0, max(0.0, belief[atom] + delta[atom]))
-            delta[atom] = 0.0
+@numba.njit(cache=True, nogil=True, inline="always")
+def _context_probability(p, prob, rule, threshold):  # type: ignore[no-untyped-def]
+    """Product of the context's marginals, cut to 0 below `threshold`."""
+    weight = 1.0
+    for k in range(p.context_ptr[rule], p.context_ptr[rule + 1]):
+        weight *= prob[p.context[k]]
+        if weight < threshold:
+            return 0.0
+    return weight
 
 
-@numba.njit(cache=True, nogil=True)
-def _goal_probability(goal_atom, goal_sign, belief):  # type: ignore[no-untyped-def]
+@numba.njit(cache=True, nogil=True, inline="always")
+def _weigh_action(p, s, action):  # type: ignore[no-untyped-def]
+    """Weights of the action's rules (no sibling applies) and the mass it is sampled with."""
+    start, stop = p.action_ptr[action], p.action_ptr[action + 1]
+    mass = 0.0
+    for i in range(start, stop):
+        weight = s.own[i]
+        for j in range(start, stop):
+            if j != i:
+                weight *= 1.0 - s.own[j]
+        s.weight[i] = weight
+        if p.effect_ptr[i + 1] > p.effect_ptr[i]:
+            mass += weight
+    s.mass[action] = mass
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _sum_block(s, b):  # type: ignore[no-untyped-def]
+    total = 0.0
+    for action in range(b * BLOCK, min((b + 1) * BLOCK, len(s.mass))):
+        total += s.mass[action]
+    s.block[b] = total
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def goal_probability(p, prob):  # type: ignore[no-untyped-def]
+    """Product of the goal literals' marginals."""
     probability = 1.0
-    for k in range(len(goal_atom)):
-        p = belief[goal_atom[k]]
-        probability *= p if goal_sign[k] == 1 else 1.0 - p
+    for k in range(len(p.goal)):
+        probability *= prob[p.goal[k]]
     return probability
 
 
-@numba.njit(cache=True, nogil=True)
-def sample_sequences(  # type: ignore[no-untyped-def]
-    action_ptr, context_ptr, context_atom, context_sign, effect_ptr, effect_atom, effect_set, effect_change,
-    goal_atom, goal_sign, belief0, draws, discount, threshold,
-):  # fmt: skip
-    """Sample one action sequence per row of `draws` (n_samples, horizon), uniform in [0, 1).
+@numba.njit(cache=True, nogil=True, inline="always")
+def _believe(s, atom, new):  # type: ignore[no-untyped-def]
+    """Set the marginal of `atom`, leaving a trail."""
+    old = s.prob[2 * atom + 1]
+    if new != old:
+        s.prob[2 * atom + 1] = new
+        s.prob[2 * atom] = 1.0 - new
+        s.atoms[s.length[ATOMS]] = atom
+        s.atoms_old[s.length[ATOMS]] = old
+        s.length[ATOMS] += 1
 
-    Returns sequences (n_samples, horizon) int32, with n_actions for doNothing; values (n_samples,); and
-    the highest goal probability after the first step (n_samples,). An action is drawn in proportion to the
-    weights of its rules that have an effect; doNothing weighs 1, and 0 at the first step. Where nothing
-    applies at the first step, the sequence is doNothing throughout.
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def advance(p, s, action):  # type: ignore[no-untyped-def]
+    """Propagate the belief through `action`."""
+    start, stop = p.action_ptr[action], p.action_ptr[action + 1]
+    for rule in range(start, stop):
+        if s.weight[rule] > 0.0:
+            for k in range(p.effect_ptr[rule], p.effect_ptr[rule + 1]):
+                atom = p.effect_atom[k]
+                s.delta[atom] += s.weight[rule] * (
+                    p.effect_set[k] - p.effect_change[k] * s.prob[2 * atom + 1]
+                )
+    mark = s.length[ATOMS]
+    for k in range(p.effect_ptr[start], p.effect_ptr[stop]):
+        atom = p.effect_atom[k]
+        if s.delta[atom] != 0.0:
+            _believe(s, atom, min(1.0, max(0.0, s.prob[2 * atom + 1] + s.delta[atom])))
+            s.delta[atom] = 0.0
+    if len(p.derived_kind) > 0 and s.length[ATOMS] > mark:
+        _rederive(p, s)
+
+
+@numba.njit(cache=True, nogil=True)
+def _rederive(p, s):  # type: ignore[no-untyped-def]
+    """Bring the derived atoms up to date with the belief."""
+    for d in range(len(p.derived_kind)):
+        row = p.derived[p.derived_ptr[d] : p.derived_ptr[d + 1]]
+        if p.derived_kind[d] == 1:
+            n = row[0]
+            for i in range(n):
+                for j in range(n):
+                    _believe(s, row[1 + n * n + i * n + j], closure_probability(row, s.prob, i, j))
+        else:
+            _believe(s, row[0], derived_probability(p.derived_kind[d], row, s.prob))
+
+
+@numba.njit(cache=True, nogil=True)
+def derived_probability(kind, row, prob):  # type: ignore[no-untyped-def]
+    """Marginal of a conjunction or a compared count, its literals taken as independent."""
+    if kind == 0:
+        none = 1.0
+        k = 1
+        while k < len(row):
+            group = 1.0
+            for literal in row[k + 1 : k + 1 + row[k]]:
+                group *= prob[literal]
+            none *= 1.0 - group
+            k += 1 + row[k]
+        return 1.0 - none
+    comparison, value = row[1], row[2]
+    counts = np.zeros(len(row) - 2)  # probability that so many literals hold
+    counts[0] = 1.0
+    for i in range(3, len(row)):
+        q = prob[row[i]]
+        for c in range(i - 2, 0, -1):
+            counts[c] = counts[c] * (1.0 - q) + counts[c - 1] * q
+        counts[0] *= 1.0 - q
+    total = 0.0
+    for c in range(len(counts)):
+        if (
+            (comparison == 0 and c == value)
+            or (comparison == 1 and c < value)
+            or (comparison == 2 and c <= value)
+            or (comparison == 3 and c > value)
+            or (comparison == 4 and c >= value)
+        ):
+            total += counts[c]
+    return min(1.0, total)
+
+
+@numba.njit(cache=True, nogil=True)
+def closure_probability(row, prob, source, target):  # type: ignore[no-untyped-def]
+    """Probability that some chain leads from `source` to `target`, chains taken as independent."""
+    n = row[0]
+    none = 1.0
+    path = np.empty(n + 1, np.int32)  # entities of the chain so far
+    upto = np.empty(n + 1)  # its probability
+    following = np.zeros(n + 1, np.int32)  # which entity to try next at each depth
+    used = np.zeros(n, np.bool_)
+    path[0], upto[0], used[source], depth = source, 1.0, source != target, 0
+    while depth >= 0:
+        nxt = following[depth]
+        if nxt == n:
+            used[path[depth]] = False
+            depth -= 1
+            continue
+        following[depth] += 1
+        chain = upto[depth] * prob[2 * row[1 + path[depth] * n + nxt] + 1]
+        if nxt == target:
+            none *= 1.0 - chain
+        elif chain > CLOSURE_CUT and not used[nxt] and nxt != source:
+            depth += 1
+            path[depth], upto[depth], following[depth], used[nxt] = nxt, chain, 0, True
+    return 1.0 - none
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def refresh(p, s, threshold, mark):  # type: ignore[no-untyped-def]
+    """Weigh again the rules and actions that the atoms on the trail from `mark` on bear on."""
+    s.length[ROUND] += 1
+    this = s.length[ROUND]
+    first = s.length[ACTIONS]
+    for i in range(mark, s.length[ATOMS]):
+        for k in range(p.watch_ptr[s.atoms[i]], p.watch_ptr[s.atoms[i] + 1]):
+            rule = p.watch[k]
+            if s.rule_stamp[rule] == this:
+                continue
+            s.rule_stamp[rule] = this
+            own = _context_probability(p, s.prob, rule, threshold)
+            if own != s.own[rule]:
+                s.rules[s.length[RULES]] = rule
+                s.rules_old[s.length[RULES]] = s.own[rule]
+                s.length[RULES] += 1
+                s.own[rule] = own
+                action = p.rule_action[rule]
+                if s.action_stamp[action] != this:
+                    s.action_stamp[action] = this
+                    s.actions[s.length[ACTIONS]] = action
+                    s.length[ACTIONS] += 1
+    _weigh_actions(p, s, first)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _weigh_actions(p, s, mark):  # type: ignore[no-untyped-def]
+    """Weigh the actions on the trail from `mark` on, and sum their blocks."""
+    for i in range(mark, s.length[ACTIONS]):
+        _weigh_action(p, s, s.actions[i])
+    summed = -1
+    for i in range(mark, s.length[ACTIONS]):
+        if s.actions[i] // BLOCK != summed:  # neighbours mostly share their block
+            summed = s.actions[i] // BLOCK
+            _sum_block(s, summed)
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def undo(p, s, atoms, rules, actions):  # type: ignore[no-untyped-def]
+    """Go back to where the three trails had these lengths."""
+    for i in range(s.length[ATOMS] - 1, atoms - 1, -1):
+        s.prob[2 * s.atoms[i] + 1] = s.atoms_old[i]
+        s.prob[2 * s.atoms[i]] = 1.0 - s.atoms_old[i]
+    for i in range(s.length[RULES] - 1, rules - 1, -1):
+        s.own[s.rules[i]] = s.rules_old[i]
+    _weigh_actions(p, s, actions)
+    s.length[ATOMS], s.length[RULES], s.length[ACTIONS] = atoms, rules, actions
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def draw_action(s, u, may_idle):  # type: ignore[no-untyped-def]
+    """An action in proportion to its mass, by `u` in [0, 1); n_actions if that is to do nothing.
+
+    Doing nothing weighs 1 where it is allowed; where nothing applies it is all that is left.
     """
-    n_samples, horizon = draws.shape
-    n_actions = len(action_ptr) - 1
-    sequences = np.full((n_samples, horizon), n_actions, dtype=np.int32)
-    values = np.empty(n_samples)
-    peaks = np.empty(n_samples)
-    weights = np.empty(len(context_ptr) - 1)
-    delta = np.zeros(len(belief0))
-    belief = np.empty(len(belief0))
-    start_probability = _goal_probability(goal_atom, goal_sign, belief0)
-    for n in range(n_samples):
-        belief[:] = belief0
-        value, peak, factor = start_probability, start_probability, 1.0
-        for t in range(horizon):
-            _rule_weights(action_ptr, context_ptr, context_atom, context_sign, belief, threshold, weights)
-            total = 0.0 if t == 0 else 1.0
-            for rule in range(len(weights)):
-                if effect_ptr[rule + 1] > effect_ptr[rule]:
-                    total += weights[rule]
-            remaining = draws[n, t] * total
-            chosen = n_actions
-            for action in range(n_actions):
-                mass = 0.0
-                for rule in range(action_ptr[action], action_ptr[action + 1]):
-                    if effect_ptr[rule + 1] > effect_ptr[rule]:
-                        mass += weights[rule]
-                if mass > 0.0 and remaining < mass:
-                    chosen = action
-                    break
-                remaining -= mass
-            if chosen < n_actions:
-                _advance(
-                    chosen, action_ptr, effect_ptr, effect_atom, effect_set, effect_change,
-                    weights, belief, delta,
-                )  # fmt: skip
-            elif t == 0 and total > 0.0:
-                # Rounding may leave the draw past the last action; doNothing is not allowed first.
-                chosen = sequences[n, 0] = _last_positive(action_ptr, effect_ptr, weights)
-                _advance(
-                    chosen, action_ptr, effect_ptr, effect_atom, effect_set, effect_change,
-                    weights, belief, delta,
-                )  # fmt: skip
-            sequences[n, t] = chosen
-            factor *= discount
-            probability = _goal_probability(goal_atom, goal_sign, belief)
-            value += factor * probability
-            peak = max(peak, probability)
-        values[n] = value
-        peaks[n] = peak
+    n_actions = len(s.mass)
+    remaining = u * (np.sum(s.block) + (1.0 if may_idle else 0.0))
+    for b in range(len(s.block)):
+        if remaining < s.block[b]:
+            for action in range(b * BLOCK, min((b + 1) * BLOCK, n_actions)):
+                if remaining < s.mass[action]:
+                    return action
+                remaining -= s.mass[action]
+            break
+        remaining -= s.block[b]
+    if not may_idle:
+        # Rounding may leave the draw past the last action.
+        for action in range(n_actions - 1, -1, -1):
+            if s.mass[action] > 0.0:
+                return action
+    return n_actions
+
+
+@numba.njit(cache=True, nogil=True)
+def _sort_by(keys, order, first, end):  # type: ignore[no-untyped-def]
+    """Sort order[first:end] in place so that its `keys` ascend: shell sort, for mostly it is a handful."""
+    gap = 1
+    while 3 * gap < end - first:
+        gap = 3 * gap + 1
+    while gap > 0:
+        for i in range(first + gap, end):
+            item, j = order[i], i
+            while j >= first + gap and keys[order[j - gap]] > keys[item]:
+                order[j] = order[j - gap]
+                j -= gap
+            order[j] = item
+        gap //= 3
+
+
+@numba.njit(cache=True, nogil=True)
+def sample_sequences(p, draws, discount, threshold):  # type: ignore[no-untyped-def]
+    """Sample one action sequence per column of `draws` (horizon, n_samples), uniform in [0, 1).
+
+    Returns sequences (horizon, n_samples) int32, with n_actions for doing nothing; values (n_samples,); and
+    the highest goal probability along each (n_samples,). An action is drawn in proportion to the weights
+    of its rules that have an effect; doing nothing weighs 1, and 0 at the first step. Samples that begin
+    alike share the work up to where they part: they are the branches of a tree that is walked depth first.
+    """
+    horizon, n_samples = draws.shape
+    idle = len(p.action_ptr) - 1
+    sequences = np.empty((horizon, n_samples), np.int32)
+    values, peaks = np.empty(n_samples), np.empty(n_samples)
+    s = make_scratch(p, threshold, horizon)
+    order = np.arange(n_samples)
+    # One node per depth: its samples still to do are order[lo:hi], sorted by the action they take there.
+    lo, hi = np.zeros(horizon, np.int64), np.full(horizon, n_samples)
+    marks = np.zeros((horizon, 3), np.int64)
+    goal, value, peak = np.zeros(horizon + 1), np.zeros(horizon + 1), np.zeros(horizon + 1)
+    goal[0] = value[0] = peak[0] = goal_probability(p, s.prob)
+    depth, fresh = 0, True
+    while depth >= 0:
+        if fresh:
+            for i in range(lo[depth], hi[depth]):
+                sequences[depth, order[i]] = draw_action(s, draws[depth, order[i]], depth > 0)
+            _sort_by(sequences[depth], order, lo[depth], hi[depth])
+            fresh = False
+        if lo[depth] == hi[depth]:
+            depth -= 1
+            if depth >= 0:
+                undo(p, s, marks[depth, ATOMS], marks[depth, RULES], marks[depth, ACTIONS])
+            continue
+        first = lo[depth]
+        action = sequences[depth, order[first]]
+        end = first + 1
+        while end < hi[depth] and sequences[depth, order[end]] == action:
+            end += 1
+        lo[depth] = end
+        for trail in range(3):
+            marks[depth, trail] = s.length[trail]
+        goal[depth + 1] = goal[depth]
+        if action != idle:
+            advance(p, s, action)
+            if depth + 1 < horizon:
+                refresh(p, s, threshold, marks[depth, ATOMS])
+            goal[depth + 1] = goal_probability(p, s.prob)
+        value[depth + 1] = value[depth] + discount ** (depth + 1) * goal[depth + 1]
+        peak[depth + 1] = max(peak[depth], goal[depth + 1])
+        if depth + 1 < horizon:
+            depth, fresh = depth + 1, True
+            lo[depth], hi[depth] = first, end
+            continue
+        for i in range(first, end):
+            values[order[i]], peaks[order[i]] = value[horizon], peak[horizon]
+        undo(p, s, marks[depth, ATOMS], marks[depth, RULES], marks[depth, ACTIONS])
     return sequences, values, peaks
 
 
 @numba.njit(cache=True, nogil=True)
-def _last_positive(action_ptr, effect_ptr, weights):  # type: ignore[no-untyped-def]
-    for action in range(len(action_ptr) - 2, -1, -1):
-        for rule in range(action_ptr[action], action_ptr[action + 1]):
-            if weights[rule] > 0.0 and effect_ptr[rule + 1] > effect_ptr[rule]:
-                return action
-    return len(action_ptr) - 1
-
-
-@numba.njit(cache=True, nogil=True)
-def evaluate_sequence(  # type: ignore[no-untyped-def]
-    action_ptr, context_ptr, context_atom, context_sign, effect_ptr, effect_atom, effect_set, effect_change,
-    goal_atom, goal_sign, belief0, sequence, discount, threshold,
-):  # fmt: skip
-    """Value, peak goal probability and final belief (n_atoms,) of one sequence of action indices."""
-    n_actions = len(action_ptr) - 1
-    weights = np.empty(len(context_ptr) - 1)
-    delta = np.zeros(len(belief0))
-    belief = belief0.copy()
-    peak = _goal_probability(goal_atom, goal_sign, belief)
-    value, factor = peak, 1.0
+def evaluate_sequence(p, sequence, discount, threshold):  # type: ignore[no-untyped-def]
+    """Value, peak goal probability and final belief (n_atoms,) of one sequence of action numbers."""
+    s = make_scratch(p, threshold, len(sequence))
+    goal = goal_probability(p, s.prob)
+    value, peak = goal, goal
     for t in range(len(sequence)):
-        if sequence[t] < n_actions:
-            _rule_weights(action_ptr, context_ptr, context_atom, context_sign, belief, threshold, weights)
-            _advance(
-                sequence[t], action_ptr, effect_ptr, effect_atom, effect_set, effect_change,
-                    weights, belief, delta,
-            )  # fmt: skip
-        factor *= discount
-        probability = _goal_probability(goal_atom, goal_sign, belief)
-        value += factor * probability
-        peak = max(peak, probability)
-    return value, peak, belief
+        if sequence[t] != len(p.action_ptr) - 1:
+            mark = s.length[ATOMS]
+            advance(p, s, sequence[t])
+            refresh(p, s, threshold, mark)
+            goal = goal_probability(p, s.prob)
+        value += discount ** (t + 1) * goal
+        peak = max(peak, goal)
+    return value, peak, s.prob[1::2].copy()

@@ -7,75 +7,87 @@ of marginals (factored frontier); its value is the discounted sum of goal probab
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from cognitive_arch.errors import PlanningError
 from cognitive_arch.planning import kernels
-from cognitive_arch.planning.base import PlanResult, PlanStatus, check_problem
-from cognitive_arch.planning.problem import Problem, compile_problem
-from cognitive_arch.relational.rules import GroundRule
-from cognitive_arch.relational.symbols import DO_NOTHING, Goal, State
+from cognitive_arch.planning.base import ArrayPlanner, PlanResult, PlanStatus, named_actions
+from cognitive_arch.planning.problem import Problem
+
+Sequence = NDArray[np.int32]  # (horizon,) numbers of actions
+Samples = tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]
+
+PARALLEL_FROM = 2000 * 1000
+"""Samples times rules from which on a second thread pays (a call then takes more than 10 ms)."""
 
 
 @dataclass(frozen=True)
-class Prada:
+class Prada(ArrayPlanner):
     """Plain PRADA.
 
     `threshold` cuts small rule weights to 0; `margin` is how far above its initial probability the goal
-    must come for a sequence to count as a plan.
+    must come for a sequence to count as a plan. `workers` threads share the samples (None: as many as
+    there are cores, for large problems); the result does not depend on it.
     """
 
     samples: int = 2000
     discount: float = 0.95
     threshold: float = 0.03
     margin: float = 0.05
+    workers: int | None = None
     name: str = "prada"
 
-    def plan(
-        self,
-        state: State,
-        goal: Goal,
-        rules: Sequence[GroundRule],
-        horizon: int,
-        rng: np.random.Generator,
-    ) -> PlanResult:
-        """See `Planner.plan`."""
-        check_problem(goal, horizon)
-        problem = compile_problem(state, goal, rules)
-        sequence = self._search(problem, horizon, rng)
-        return self._result(problem, sequence, horizon)
+    def __post_init__(self) -> None:
+        if self.samples < 1:
+            raise PlanningError(f"{self.samples} samples are too few; valid: 1 or more")
 
-    def _search(self, problem: Problem, horizon: int, rng: np.random.Generator) -> NDArray[np.int32] | None:
+    def solve(self, problem: Problem, horizon: int, rng: np.random.Generator) -> PlanResult:
+        """See `ArrayPlanner.solve`."""
+        sequence = self._search(problem, horizon, rng)
+        if sequence is None:
+            idle = np.full(horizon, problem.idle, dtype=np.int32)
+            return PlanResult(PlanStatus.NO_PLAN, (), *self._evaluate(problem, idle))
+        actions = named_actions(problem, sequence.tolist())
+        return PlanResult(PlanStatus.PLAN, actions, *self._evaluate(problem, sequence))
+
+    def _search(self, problem: Problem, horizon: int, rng: np.random.Generator) -> Sequence | None:
         """Best of one round of samples, or None if none of them raises the goal's probability enough."""
-        draws = rng.random((self.samples, horizon))
-        sequences, values, peaks = kernels.sample_sequences(
-            *problem.arrays(), draws, self.discount, self.threshold
-        )
-        if peaks.max() <= self._start_probability(problem) + self.margin:
+        sequences, values, peaks = self._sample(problem, rng.random((horizon, self.samples)))
+        start = np.prod(problem.arrays.start[problem.arrays.goal])
+        if peaks.max() <= start + self.margin:
             return None
-        best: NDArray[np.int32] = sequences[int(values.argmax())]
+        best: Sequence = sequences[:, int(values.argmax())]
         return best
 
-    def _start_probability(self, problem: Problem) -> float:
-        return self._evaluate(problem, np.empty(0, dtype=np.int32))[1]
+    def _sample(self, problem: Problem, draws: NDArray[np.float64]) -> Samples:
+        """One sequence per column of `draws`, by as many threads as pay."""
+        workers = self.workers
+        if workers is None:
+            large = self.samples * len(problem.rules) >= PARALLEL_FROM
+            workers = (os.cpu_count() or 1) if large else 1
+        parts = np.array_split(draws, min(workers, self.samples), axis=1)
+        if len(parts) == 1:
+            return self._sample_part(problem, draws)
+        with ThreadPoolExecutor(len(parts)) as pool:
+            done = list(pool.map(lambda part: self._sample_part(problem, np.ascontiguousarray(part)), parts))
+        sequences, values, peaks = zip(*done, strict=True)
+        return np.concatenate(sequences, axis=1), np.concatenate(values), np.concatenate(peaks)
 
-    def _evaluate(self, problem: Problem, sequence: NDArray[np.int32]) -> tuple[float, float]:
-        value, peak, _ = kernels.evaluate_sequence(*problem.arrays(), sequence, self.discount, self.threshold)
+    def _sample_part(self, problem: Problem, draws: NDArray[np.float64]) -> Samples:
+        samples: Samples = kernels.sample_sequences(problem.arrays, draws, self.discount, self.threshold)
+        return samples
+
+    def _evaluate(self, problem: Problem, sequence: Sequence) -> tuple[float, float]:
+        """Value and highest goal probability of `sequence`."""
+        value, peak, _ = kernels.evaluate_sequence(
+            problem.arrays, np.ascontiguousarray(sequence), self.discount, self.threshold
+        )
         return float(value), float(peak)
-
-    def _result(self, problem: Problem, sequence: NDArray[np.int32] | None, horizon: int) -> PlanResult:
-        if sequence is None:
-            idle = np.full(horizon, len(problem.actions), dtype=np.int32)
-            return PlanResult(PlanStatus.NO_PLAN, (), *self._evaluate(problem, idle))
-        value, peak = self._evaluate(problem, sequence)
-        names = [*problem.actions, DO_NOTHING]
-        actions = [names[i] for i in sequence]
-        while actions and actions[-1] == DO_NOTHING:
-            actions.pop()
-        return PlanResult(PlanStatus.PLAN, tuple(actions), value, peak)
 
 
 @dataclass(frozen=True)
@@ -85,19 +97,19 @@ class APrada(Prada):
     rounds: int = 3
     name: str = "a-prada"
 
-    def _search(self, problem: Problem, horizon: int, rng: np.random.Generator) -> NDArray[np.int32] | None:
+    def _search(self, problem: Problem, horizon: int, rng: np.random.Generator) -> Sequence | None:
         for _ in range(self.rounds):
             sequence = super()._search(problem, horizon, rng)
             if sequence is not None:
                 return self._shorten(problem, sequence)
         return None
 
-    def _shorten(self, problem: Problem, sequence: NDArray[np.int32]) -> NDArray[np.int32]:
+    def _shorten(self, problem: Problem, sequence: Sequence) -> Sequence:
         """Delete one action at a time, keeping a deletion that raises the value.
 
         The freed step at the end is spent doing nothing, so that all values sum over the same steps.
         """
-        idle = np.int32(len(problem.actions))
+        idle = np.int32(problem.idle)
         value, _ = self._evaluate(problem, sequence)
         position = 0
         while position < len(sequence):

@@ -145,22 +145,15 @@ class RuleSet:
         itself can never apply and is left out. `actions` restricts to those action names.
         Raises `GroundingError` for an entity whose type the rules do not know.
         """
-        known = sorted(set(entities))
-        for entity in known:
-            if entity.type not in self.types:
-                raise GroundingError(unknown(f"type of {entity.name}", entity.type, self.types))
-        ground: list[GroundRule] = []
-        for rule in self.rules:
-            if actions is None or rule.action in actions:
-                ground.extend(self._ground_rule(rule, known))
-        return tuple(ground)
+        grounder = _Grounder(self, entities)
+        wanted = [rule for rule in self.rules if actions is None or rule.action in actions]
+        return tuple(ground for rule in wanted for ground in grounder.groundings(rule))
 
     def ground_call(
         self, rule: NIDRule, args: Sequence[str], entities: Sequence[Entity]
     ) -> GroundRule | None:
         """`rule` with its parameters bound to `args`; None if its context contradicts itself."""
-        binding = dict(zip((p.name for p in rule.parameters), args, strict=True))
-        return self._bind(rule, binding, sorted(set(entities)))
+        return _Grounder(self, entities).bind(rule, tuple(args))
 
     def rule_for(self, action: str) -> NIDRule:
         """The first rule of `action`; raises `GroundingError` listing the actions if there is none."""
@@ -169,51 +162,64 @@ class RuleSet:
                 return rule
         raise GroundingError(unknown("action", action, {r.action for r in self.rules}))
 
-    def _ground_rule(self, rule: NIDRule, entities: Sequence[Entity]) -> Iterator[GroundRule]:
-        choices = [[e.name for e in entities if self.is_a(e.type, p.type)] for p in rule.parameters]
-        for args in itertools.product(*choices):
-            if len(set(args)) < len(args):
-                continue
-            binding = dict(zip((p.name for p in rule.parameters), args, strict=True))
-            ground = self._bind(rule, binding, entities)
-            if ground is not None:
-                yield ground
 
-    def _bind(
-        self, rule: NIDRule, binding: Mapping[str, str], entities: Sequence[Entity]
-    ) -> GroundRule | None:
-        context = _unique(lit for lifted in rule.context for lit in self._expand(lifted, binding, entities))
-        if any(literal.negated() in context for literal in context):
+class _Grounder:
+    """Binds the variables of one rule set to the entities of one scene.
+
+    What a literal expands to depends on few of a rule's variables, so expansions are kept.
+    """
+
+    def __init__(self, rules: RuleSet, entities: Sequence[Entity]) -> None:
+        known = sorted(set(entities))
+        for entity in known:
+            if entity.type not in rules.types:
+                raise GroundingError(unknown(f"type of {entity.name}", entity.type, rules.types))
+        self._predicates = rules.predicates
+        self._of_type = {t: [e.name for e in known if rules.is_a(e.type, t)] for t in rules.types}
+        self._hands = [e.name for e in known if e.type == "hand"]
+        self._expansions: dict[tuple[LiftedLiteral, tuple[str, ...]], tuple[Literal, ...]] = {}
+
+    def groundings(self, rule: NIDRule) -> Iterator[GroundRule]:
+        """All ground rules of `rule`."""
+        for args in itertools.product(*(self._of_type[p.type] for p in rule.parameters)):
+            if len(set(args)) == len(args):
+                ground = self.bind(rule, args)
+                if ground is not None:
+                    yield ground
+
+    def bind(self, rule: NIDRule, args: tuple[str, ...]) -> GroundRule | None:
+        """`rule` with its parameters bound to `args`; None if its context contradicts itself."""
+        binding = dict(zip((p.name for p in rule.parameters), args, strict=True))
+        context = self._conjunction(rule.context, binding)
+        signs: dict[Atom, bool] = {}
+        if any(signs.setdefault(atom, positive) != positive for atom, positive in context):
             return None
         outcomes = tuple(
-            GroundOutcome(
-                o.probability,
-                _unique(lit for lifted in o.literals for lit in self._expand(lifted, binding, entities)),
-            )
-            for o in rule.outcomes
+            GroundOutcome(o.probability, self._conjunction(o.literals, binding)) for o in rule.outcomes
         )
-        action = GroundAction(rule.action, tuple(binding[p.name] for p in rule.parameters))
-        return GroundRule(action, context, outcomes)
+        return GroundRule(GroundAction(rule.action, args), context, outcomes)
 
-    def _expand(
-        self, literal: LiftedLiteral, binding: Mapping[str, str], entities: Sequence[Entity]
-    ) -> Iterator[Literal]:
-        types = self.predicates[literal.predicate].types
-        named = {binding.get(a, a) for a in literal.args}
-        bound_hands = [
-            binding[p] for p in binding if any(e.name == binding[p] and e.type == "hand" for e in entities)
-        ]
-        choices: list[list[str]] = []
-        for arg, type_ in zip(literal.args, types, strict=True):
-            if arg == ALL:
-                choices.append([e.name for e in entities if self.is_a(e.type, type_) and e.name not in named])
-            elif arg == OTHERHAND:
-                choices.append([e.name for e in entities if e.type == "hand" and e.name not in bound_hands])
-            else:
-                choices.append([binding.get(arg, arg)])
-        for args in itertools.product(*choices):
-            yield Literal(Atom(literal.predicate, args), literal.positive)
+    def _conjunction(
+        self, literals: Sequence[LiftedLiteral], binding: Mapping[str, str]
+    ) -> tuple[Literal, ...]:
+        return tuple(dict.fromkeys(ground for lit in literals for ground in self._expand(lit, binding)))
 
-
-def _unique(literals: Iterator[Literal]) -> tuple[Literal, ...]:
-    return tuple(dict.fromkeys(literals))
+    def _expand(self, literal: LiftedLiteral, binding: Mapping[str, str]) -> tuple[Literal, ...]:
+        args = tuple(binding.get(a, a) for a in literal.args)
+        # OTHERHAND depends on which hand the rule has already, wherever that stands.
+        bound = tuple(h for h in binding.values() if h in self._hands) if OTHERHAND in args else ()
+        key = (literal, args + bound)
+        if key not in self._expansions:
+            choices = [
+                [name for name in self._of_type[type_] if name not in args]
+                if arg == ALL
+                else [hand for hand in self._hands if hand not in bound]
+                if arg == OTHERHAND
+                else [arg]
+                for arg, type_ in zip(args, self._predicates[literal.predicate].types, strict=True)
+            ]
+            self._expansions[key] = tuple(
+                Literal(Atom(literal.predicate, chosen), literal.positive)
+                for chosen in itertools.product(*choices)
+            )
+        return self._expansions[key]
