@@ -34,10 +34,10 @@ def grammar_text(name: str) -> str:
     return (data_root() / "grammar" / f"{name}.lark").read_text(encoding="utf-8")
 
 
-def read_text(path: Path, what: str, error: type[CogArchError]) -> str:
+def read_text(path: Path, what: str, error: type[CogArchError], *, limit: int = MAX_BYTES) -> str:
     """Text of a file that a person named; raises `error` in one line if it cannot be one.
 
-    Only plain files are opened: a pipe or a device might never end.
+    Only plain files of at most `limit` bytes are opened: a pipe or a device might never end.
     """
     if not path.exists():
         raise error(f"no {what} at '{one_line(path)}'")
@@ -45,9 +45,12 @@ def read_text(path: Path, what: str, error: type[CogArchError]) -> str:
         raise error(f"'{one_line(path)}' is not a file; a {what} is needed")
     try:
         with path.open("rb") as file:
-            data = file.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise error(f"'{one_line(path)}' is too large for a {what}: at most {MAX_BYTES} bytes")
+            data = file.read(limit + 1)
+        if len(data) > limit:
+            raise error(f"'{one_line(path)}' is too large for a {what}: at most {limit} bytes")
         return data.decode("utf-8")
-    except (OSError, UnicodeDecodeError) as problem:
+    except UnicodeDecodeError as problem:
+        line = data.count(b"\n", 0, problem.start) + 1
+        raise error(f"{one_line(path, 200)}, line {line}: cannot read the {what}: no UTF-8 text") from None
+    except OSError as problem:
         raise error(f"cannot read the {what} '{one_line(path)}': {one_line(problem)}") from None
