@@ -124,7 +124,7 @@ def goal_probability(p, prob):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def _believe(s, atom, new):  # type: ignore[no-untyped-def]
+def believe(s, atom, new):  # type: ignore[no-untyped-def]
     """Set the marginal of `atom`, leaving a trail."""
     old = s.prob[2 * atom + 1]
     if new != old:
@@ -150,14 +150,14 @@ def advance(p, s, action):  # type: ignore[no-untyped-def]
     for k in range(p.effect_ptr[start], p.effect_ptr[stop]):
         atom = p.effect_atom[k]
         if s.delta[atom] != 0.0:
-            _believe(s, atom, min(1.0, max(0.0, s.prob[2 * atom + 1] + s.delta[atom])))
+            believe(s, atom, min(1.0, max(0.0, s.prob[2 * atom + 1] + s.delta[atom])))
             s.delta[atom] = 0.0
     if len(p.derived_kind) > 0 and s.length[ATOMS] > mark:
-        _rederive(p, s)
+        rederive(p, s)
 
 
 @numba.njit(cache=True, nogil=True)
-def _rederive(p, s):  # type: ignore[no-untyped-def]
+def rederive(p, s):  # type: ignore[no-untyped-def]
     """Bring the derived atoms up to date with the belief."""
     for d in range(len(p.derived_kind)):
         row = p.derived[p.derived_ptr[d] : p.derived_ptr[d + 1]]
@@ -165,9 +165,9 @@ def _rederive(p, s):  # type: ignore[no-untyped-def]
             n = row[0]
             for i in range(n):
                 for j in range(n):
-                    _believe(s, row[1 + n * n + i * n + j], closure_probability(row, s.prob, i, j))
+                    believe(s, row[1 + n * n + i * n + j], closure_probability(row, s.prob, i, j))
         else:
-            _believe(s, row[0], derived_probability(p.derived_kind[d], row, s.prob))
+            believe(s, row[0], derived_probability(p.derived_kind[d], row, s.prob))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -278,104 +278,6 @@ def undo(p, s, atoms, rules, actions):  # type: ignore[no-untyped-def]
         s.own[s.rules[i]] = s.rules_old[i]
     _weigh_actions(p, s, actions)
     s.length[ATOMS], s.length[RULES], s.length[ACTIONS] = atoms, rules, actions
-
-
-@numba.njit(cache=True, nogil=True, inline="always")
-def draw_action(s, u, may_idle):  # type: ignore[no-untyped-def]
-    """An action in proportion to its mass, by `u` in [0, 1); n_actions if that is to do nothing.
-
-    Doing nothing weighs 1 where it is allowed; where nothing applies it is all that is left.
-    """
-    n_actions = len(s.mass)
-    remaining = u * (np.sum(s.block) + (1.0 if may_idle else 0.0))
-    for b in range(len(s.block)):
-        if remaining < s.block[b]:
-            for action in range(b * BLOCK, min((b + 1) * BLOCK, n_actions)):
-                if remaining < s.mass[action]:
-                    return action
-                remaining -= s.mass[action]
-            break
-        remaining -= s.block[b]
-    if not may_idle:
-        # Rounding may leave the draw past the last action.
-        for action in range(n_actions - 1, -1, -1):
-            if s.mass[action] > 0.0:
-                return action
-    return n_actions
-
-
-@numba.njit(cache=True, nogil=True)
-def _sort_by(keys, order, first, end):  # type: ignore[no-untyped-def]
-    """Sort order[first:end] in place so that its `keys` ascend: shell sort, for mostly it is a handful."""
-    gap = 1
-    while 3 * gap < end - first:
-        gap = 3 * gap + 1
-    while gap > 0:
-        for i in range(first + gap, end):
-            item, j = order[i], i
-            while j >= first + gap and keys[order[j - gap]] > keys[item]:
-                order[j] = order[j - gap]
-                j -= gap
-            order[j] = item
-        gap //= 3
-
-
-@numba.njit(cache=True, nogil=True)
-def sample_sequences(p, draws, discount, threshold):  # type: ignore[no-untyped-def]
-    """Sample one action sequence per column of `draws` (horizon, n_samples), uniform in [0, 1).
-
-    Returns sequences (horizon, n_samples) int32, with n_actions for doing nothing; values (n_samples,); and
-    the highest goal probability along each (n_samples,). An action is drawn in proportion to the weights
-    of its rules that have an effect; doing nothing weighs 1, and 0 at the first step. Samples that begin
-    alike share the work up to where they part: they are the branches of a tree that is walked depth first.
-    """
-    horizon, n_samples = draws.shape
-    idle = len(p.action_ptr) - 1
-    sequences = np.empty((horizon, n_samples), np.int32)
-    values, peaks = np.empty(n_samples), np.empty(n_samples)
-    s = make_scratch(p, threshold, horizon)
-    order = np.arange(n_samples)
-    # One node per depth: its samples still to do are order[lo:hi], sorted by the action they take there.
-    lo, hi = np.zeros(horizon, np.int64), np.full(horizon, n_samples)
-    marks = np.zeros((horizon, 3), np.int64)
-    goal, value, peak = np.zeros(horizon + 1), np.zeros(horizon + 1), np.zeros(horizon + 1)
-    goal[0] = value[0] = peak[0] = goal_probability(p, s.prob)
-    depth, fresh = 0, True
-    while depth >= 0:
-        if fresh:
-            for i in range(lo[depth], hi[depth]):
-                sequences[depth, order[i]] = draw_action(s, draws[depth, order[i]], depth > 0)
-            _sort_by(sequences[depth], order, lo[depth], hi[depth])
-            fresh = False
-        if lo[depth] == hi[depth]:
-            depth -= 1
-            if depth >= 0:
-                undo(p, s, marks[depth, ATOMS], marks[depth, RULES], marks[depth, ACTIONS])
-            continue
-        first = lo[depth]
-        action = sequences[depth, order[first]]
-        end = first + 1
-        while end < hi[depth] and sequences[depth, order[end]] == action:
-            end += 1
-        lo[depth] = end
-        for trail in range(3):
-            marks[depth, trail] = s.length[trail]
-        goal[depth + 1] = goal[depth]
-        if action != idle:
-            advance(p, s, action)
-            if depth + 1 < horizon:
-                refresh(p, s, threshold, marks[depth, ATOMS])
-            goal[depth + 1] = goal_probability(p, s.prob)
-        value[depth + 1] = value[depth] + discount ** (depth + 1) * goal[depth + 1]
-        peak[depth + 1] = max(peak[depth], goal[depth + 1])
-        if depth + 1 < horizon:
-            depth, fresh = depth + 1, True
-            lo[depth], hi[depth] = first, end
-            continue
-        for i in range(first, end):
-            values[order[i]], peaks[order[i]] = value[horizon], peak[horizon]
-        undo(p, s, marks[depth, ATOMS], marks[depth, RULES], marks[depth, ACTIONS])
-    return sequences, values, peaks
 
 
 @numba.njit(cache=True, nogil=True)

@@ -8,8 +8,10 @@ of marginals (factored frontier); its value is the discounted sum of goal probab
 from __future__ import annotations
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +20,7 @@ from cognitive_arch.errors import PlanningError
 from cognitive_arch.planning import kernels
 from cognitive_arch.planning.base import ArrayPlanner, PlanResult, PlanStatus, named_actions
 from cognitive_arch.planning.problem import Problem
+from cognitive_arch.planning.sampling import sample_sequences
 
 Sequence = NDArray[np.int32]  # (horizon,) numbers of actions
 Samples = tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]
@@ -48,16 +51,11 @@ class Prada(ArrayPlanner):
 
     def solve(self, problem: Problem, horizon: int, rng: np.random.Generator) -> PlanResult:
         """See `ArrayPlanner.solve`."""
-        sequence = self._search(problem, horizon, rng)
-        if sequence is None:
-            idle = np.full(horizon, problem.idle, dtype=np.int32)
-            return PlanResult(PlanStatus.NO_PLAN, (), *self._evaluate(problem, idle))
-        actions = named_actions(problem, sequence.tolist())
-        return PlanResult(PlanStatus.PLAN, actions, *self._evaluate(problem, sequence))
+        return self._result(problem, self._search(problem, horizon, rng), horizon)
 
     def _search(self, problem: Problem, horizon: int, rng: np.random.Generator) -> Sequence | None:
         """Best of one round of samples, or None if none of them raises the goal's probability enough."""
-        sequences, values, peaks = self._sample(problem, rng.random((horizon, self.samples)))
+        sequences, values, peaks = self._share_out(self._sample, problem, rng.random((horizon, self.samples)))
         start = np.prod(problem.arrays.start[problem.arrays.goal])
         if peaks.max() <= start + self.margin:
             return None
@@ -65,22 +63,33 @@ class Prada(ArrayPlanner):
         return best
 
     def _sample(self, problem: Problem, draws: NDArray[np.float64]) -> Samples:
-        """One sequence per column of `draws`, by as many threads as pay."""
+        samples: Samples = sample_sequences(problem.arrays, None, draws, self.discount, self.threshold)
+        return samples
+
+    def _share_out(
+        self,
+        sample: Callable[[Problem, NDArray[np.float64]], Samples],
+        problem: Problem,
+        draws: NDArray[np.float64],
+    ) -> Samples:
+        """`sample` one sequence per column of `draws` (horizon, n_samples), by as many threads as pay."""
+        n_samples = draws.shape[1]
         workers = self.workers
         if workers is None:
-            large = self.samples * len(problem.rules) >= PARALLEL_FROM
-            workers = (os.cpu_count() or 1) if large else 1
-        parts = np.array_split(draws, min(workers, self.samples), axis=1)
-        if len(parts) == 1:
-            return self._sample_part(problem, draws)
+            workers = (os.cpu_count() or 1) if n_samples * len(problem.rules) >= PARALLEL_FROM else 1
+        if workers == 1 or n_samples == 1:
+            return sample(problem, draws)
+        parts = [np.ascontiguousarray(p) for p in np.array_split(draws, min(workers, n_samples), axis=1)]
         with ThreadPoolExecutor(len(parts)) as pool:
-            done = list(pool.map(lambda part: self._sample_part(problem, np.ascontiguousarray(part)), parts))
-        sequences, values, peaks = zip(*done, strict=True)
+            sequences, values, peaks = zip(*pool.map(partial(sample, problem), parts), strict=True)
         return np.concatenate(sequences, axis=1), np.concatenate(values), np.concatenate(peaks)
 
-    def _sample_part(self, problem: Problem, draws: NDArray[np.float64]) -> Samples:
-        samples: Samples = kernels.sample_sequences(problem.arrays, draws, self.discount, self.threshold)
-        return samples
+    def _result(self, problem: Problem, sequence: Sequence | None, horizon: int) -> PlanResult:
+        if sequence is None:
+            idle = np.full(horizon, problem.idle, dtype=np.int32)
+            return PlanResult(PlanStatus.NO_PLAN, (), *self._evaluate(problem, idle))
+        actions = named_actions(problem, sequence.tolist())
+        return PlanResult(PlanStatus.PLAN, actions, *self._evaluate(problem, sequence))
 
     def _evaluate(self, problem: Problem, sequence: Sequence) -> tuple[float, float]:
         """Value and highest goal probability of `sequence`."""

@@ -6,9 +6,14 @@ from collections.abc import Callable, Mapping
 
 from cognitive_arch.errors import PlanningError, unknown
 from cognitive_arch.planning.base import Planner
+from cognitive_arch.planning.guided import GuidedPrada
 from cognitive_arch.planning.prada import APrada, Prada
 
-PLANNERS: Mapping[str, Callable[[], Planner]] = {"a-prada": APrada, "prada": Prada}
+PLANNERS: Mapping[str, Callable[[], Planner]] = {
+    "a-prada": APrada,
+    "guided-prada": GuidedPrada,
+    "prada": Prada,
+}
 """Name -> constructor with default settings."""
 
 
