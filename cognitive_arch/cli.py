@@ -36,6 +36,9 @@ RulesOption = Annotated[
 StoreOption = Annotated[
     Path, typer.Option("--store", envvar="COGARCH_STORE", help="Folder where runs are kept.")
 ]
+PlannerOption = Annotated[
+    str, typer.Option(help="guided-prada, a-prada, prada, uct, sst, or one that another package adds.")
+]
 Sentence = Annotated[str, typer.Argument(help='What to do, for example "make a ham sandwich".')]
 
 
@@ -75,7 +78,7 @@ def run(
     heuristics: Annotated[
         str, typer.Option(help="all, none, or a list of adaptability,creativity,goal_maintenance.")
     ] = "all",
-    planner: Annotated[str, typer.Option(help="a-prada or prada.")] = "a-prada",
+    planner: PlannerOption = "guided-prada",
     seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
     jitter: Annotated[
         float, typer.Option(help="Move the objects by up to this many metres, and turn them, at the start.")
@@ -108,6 +111,50 @@ def run(
         result = run_task(sentence, config, store, live.progress)
     _print(result, report.result_text(result), as_json)
     if not result["success"]:
+        raise typer.Exit(1)
+
+
+@app.command()
+def plan(
+    sentence: Annotated[
+        str | None, typer.Argument(help='What to plan for, for example "make a ham sandwich".')
+    ] = None,
+    scene: SceneOption = "simple",
+    goal: Annotated[
+        str | None, typer.Option(help='Literals such as "on(Ham,Bun-bottom)", or a file with them.')
+    ] = None,
+    state: Annotated[
+        Path | None, typer.Option(help="A file of literals to start from instead of the scene's own state.")
+    ] = None,
+    rules: RulesOption = None,
+    symbols: Annotated[
+        Path | None,
+        typer.Option(help="libPRADA's symbols file; then --rules, --state and --goal are libPRADA's, too."),
+    ] = None,
+    planner: PlannerOption = "guided-prada",
+    horizon: Annotated[int, typer.Option(help="How many actions a plan may have.")] = 5,
+    samples: Annotated[int | None, typer.Option(help="Sequences (or episodes) to sample.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    repeat: Annotated[int, typer.Option(help="Plan so often; the time told is the median.")] = 1,
+    evaluate: Annotated[
+        bool, typer.Option("--evaluate", help="Say how likely the plan is to reach the goal by the rules.")
+    ] = False,
+    actions: Annotated[
+        str | None, typer.Option(help="Evaluate these actions instead of planning, separated by commas.")
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Plan once, without acting: for a scene, or for a problem in libPRADA's files."""
+    from cognitive_arch import dry_run
+
+    settings = dry_run.PlanSettings(planner, horizon, samples, seed, repeat, evaluate)
+    load = dry_run.loader(sentence, scene, goal, state, rules, symbols)
+    if actions is None:
+        answer = dry_run.plan_once(load, settings, lambda text: print(text, file=sys.stderr, flush=True))
+    else:
+        answer = dry_run.evaluate_given(load, actions, settings)
+    _print(answer, dry_run.plan_text(answer), as_json)
+    if answer.get("status") == "no_plan":
         raise typer.Exit(1)
 
 

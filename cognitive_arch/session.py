@@ -22,7 +22,7 @@ from cognitive_arch.language.goals import GoalCompiler
 from cognitive_arch.language.instruction import parse_instruction
 from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
 from cognitive_arch.planning.base import Planner
-from cognitive_arch.planning.registry import make_planner
+from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
 from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction
@@ -120,7 +120,7 @@ class RunConfig:
     backend: str = "drake"
     noise: NoiseLevels = NoiseLevels()
     heuristics: Heuristics = Heuristics()
-    planner: str = "a-prada"
+    planner: str = DEFAULT_PLANNER
     seed: int = 0
     jitter: float = 0.0
     rules: str | None = None

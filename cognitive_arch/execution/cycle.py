@@ -295,6 +295,12 @@ class PlanningCycle:
         report = None
         if end is not EndReason.GOAL_REACHED:
             report = explain_failure(
-                end, progress.index + 1, progress.goal, state.atoms(), self._ground(state), progress.tried
+                end,
+                progress.index + 1,
+                progress.goal,
+                state.atoms(),
+                self._ground(state),
+                progress.tried,
+                progress.horizon,
             )
         return EpisodeResult(report is None, end, good, total, report, state)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import StrEnum
+from typing import Any
 
+from cognitive_arch.planning.diagnosis import Diagnosis, LiteralDiagnosis, Verdict, diagnose
 from cognitive_arch.relational.rules import GroundRule
-from cognitive_arch.relational.symbols import Goal, GroundAction, Literal, State
+from cognitive_arch.relational.symbols import Goal, GroundAction, State
 
 
 class EndReason(StrEnum):
@@ -21,44 +23,47 @@ class EndReason(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class MissingLiteral:
-    """One goal literal that is not true, and what stands in the way of making it so.
+class Attempts:
+    """How often an action was tried for a sub-goal, and how often it worked."""
 
-    `action` is the action that comes closest to it, `unmet` those of its preconditions that do not hold,
-    `tried` whether it was attempted; without any such action the rules know no way at all.
-    """
+    action: str
+    tried: int
+    worked: int
 
-    literal: str
-    action: str | None
-    unmet: tuple[str, ...]
-    tried: bool = False
+    def __str__(self) -> str:
+        return f"{self.action} ({self.worked} of {self.tried} worked)"
 
 
 @dataclass(frozen=True, slots=True)
 class FailureReport:
-    """Which sub-goal was not reached, what was tried for it, what is missing."""
+    """Which sub-goal was not reached, what was tried for it, what stands in the way."""
 
     reason: EndReason
     subgoal: int
-    missing: tuple[MissingLiteral, ...]
-    tried: tuple[str, ...]
+    attempts: tuple[Attempts, ...]
+    diagnosis: Diagnosis
 
     def __str__(self) -> str:
-        parts = [f"sub-goal {self.subgoal} was not reached ({self.reason})"]
-        parts.append("tried: " + (", ".join(self.tried) or "nothing, for nothing promised to help"))
-        for item in self.missing:
-            parts.append(f"missing: {item.literal} ({_way(item)})")
+        tried = ", ".join(map(str, self.attempts)) or "nothing, for nothing promised to help"
+        parts = [f"sub-goal {self.subgoal} was not reached ({self.reason})", f"tried: {tried}"]
+        if self.diagnosis.verdict is not Verdict.HOLDS:
+            parts += [f"missing: {self._missing(literal)}" for literal in self.diagnosis.literals]
         return "; ".join(parts)
 
+    def _missing(self, item: LiteralDiagnosis) -> str:
+        """The plain truth about what was tried goes before what the rules promise."""
+        if not item.unmet and any(a.action == str(item.action) for a in self.attempts):
+            return f"{item.literal} ({item.action} should do it, but did not work)"
+        return str(item)
 
-def _way(item: MissingLiteral) -> str:
-    if item.action is None:
-        return "no rule makes it true with what is here"
-    if item.unmet:
-        return f"{item.action} would do it, but needs {', '.join(item.unmet)}"
-    if item.tried:
-        return f"{item.action} should do it, but did not work"
-    return f"{item.action} would do it, but does not lead to the rest of the goal"
+    def to_json(self) -> dict[str, Any]:
+        """Plain data, literals written out."""
+        return {
+            "reason": str(self.reason),
+            "subgoal": self.subgoal,
+            "tried": [{"action": a.action, "tried": a.tried, "worked": a.worked} for a in self.attempts],
+            **self.diagnosis.to_json(),
+        }
 
 
 def explain_failure(
@@ -68,32 +73,13 @@ def explain_failure(
     state: State,
     rules: Sequence[GroundRule],
     tried: Sequence[tuple[GroundAction, bool]],
+    horizon: int,
 ) -> FailureReport:
     """Report on `goal` (number `subgoal`, from 1) in `state`; `tried` are the attempts made for it."""
-    missing = tuple(
-        _missing(literal, state, rules, {action for action, _ in tried})
-        for literal in goal
-        if not literal.holds(state)
-    )
-    attempts: Counter[GroundAction] = Counter(action for action, _ in tried)
+    count: Counter[GroundAction] = Counter(action for action, _ in tried)
     worked: Counter[GroundAction] = Counter(action for action, ok in tried if ok)
-    lines = tuple(f"{a} ({worked[a]} of {n} worked)" for a, n in sorted(attempts.items()))
-    return FailureReport(reason, subgoal, missing, lines)
-
-
-def _missing(
-    literal: Literal, state: State, rules: Sequence[GroundRule], tried: Collection[GroundAction]
-) -> MissingLiteral:
-    makers = [rule for rule in rules if rule.outcomes and literal in rule.outcomes[0].literals]
-    if not makers:
-        return MissingLiteral(str(literal), None, ())
-    best = min(makers, key=lambda rule: (len(_unmet(rule, state)), rule.action not in tried, rule.action))
-    unmet = tuple(map(str, _unmet(best, state)))
-    return MissingLiteral(str(literal), str(best.action), unmet, best.action in tried)
-
-
-def _unmet(rule: GroundRule, state: State) -> list[Literal]:
-    return [literal for literal in rule.context if not literal.holds(state)]
+    attempts = tuple(Attempts(str(a), n, worked[a]) for a, n in sorted(count.items()))
+    return FailureReport(reason, subgoal, attempts, diagnose(state, goal, rules, horizon))
 
 
 def absent_entities(goal: Goal, known: Sequence[str]) -> tuple[str, ...]:

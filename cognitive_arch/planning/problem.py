@@ -81,12 +81,14 @@ class Problem:
         return _select(self, rules, np.ones(len(self.arrays.context), dtype=np.bool_))
 
 
-def compile_problem(state: State, goal: Goal, rules: Sequence[GroundRule]) -> Problem:
+def compile_problem(
+    state: State, goal: Goal, rules: Sequence[GroundRule], simplify: bool = True
+) -> Problem:
     """Flatten `rules` for one state and goal; derived atoms are worked out here.
 
-    Literals over atoms that no rule changes are decided here: a true one is a factor 1, a false one makes
-    its rule's weight 0 for ever, so both can be left out without changing any belief. Atoms and actions
-    are numbered in the order in which the rules name them, so that names have no influence.
+    To `simplify`, literals over atoms that no rule changes are decided here: a true one is a factor 1, a
+    false one makes its rule's weight 0 for ever, so both can be left out without changing any belief. Atoms
+    and actions are numbered in the order in which the rules name them, so that names have no influence.
     """
     encoded, changing = _encode(_Same(rules))
     state = derive(state, derived_of(rules))
@@ -102,6 +104,8 @@ def compile_problem(state: State, goal: Goal, rules: Sequence[GroundRule]) -> Pr
         arrays=encoded.arrays._replace(start=start, goal=_ints(_code(lit, index) for lit in goal)),
     )
     a = everything.arrays
+    if not simplify:
+        return everything.keep(np.ones(len(a.rule_action), dtype=np.bool_))
     live = changing[a.context >> 1]
     impossible = ~live & (start[a.context] == 0)
     dead = np.bincount(_row_numbers(a.context_ptr)[impossible], minlength=len(a.rule_action)) > 0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import platform
 import subprocess
-from dataclasses import asdict
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -62,7 +61,7 @@ def result_record(result: EpisodeResult, speed: float) -> dict[str, Any]:
         "speed": speed,
         "good": result.good,
         "total": result.total,
-        "failure": asdict(result.failure) if result.failure else None,
+        "failure": result.failure.to_json() if result.failure else None,
         "explanation": str(result.failure) if result.failure else None,
         "final_state": sorted_atoms(result.final.atoms()),
     }

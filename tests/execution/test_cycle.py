@@ -11,11 +11,12 @@ import pytest
 from cognitive_arch.domain import load_scene
 from cognitive_arch.execution.cycle import CycleSettings, EpisodeResult, PlanningCycle, Step
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
-from cognitive_arch.execution.explain import EndReason
+from cognitive_arch.execution.explain import Attempts, EndReason
 from cognitive_arch.execution.heuristics import EventKind, Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.symbolic import SymbolicEnvironment
-from cognitive_arch.planning.registry import make_planner
+from cognitive_arch.planning.diagnosis import Verdict
+from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
 from cognitive_arch.relational.parser import parse_rules
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.session import RunConfig, Session, Setting
@@ -70,7 +71,7 @@ def episode(
     cycle = PlanningCycle(
         environment,
         WorldModel(),
-        make_planner("a-prada"),
+        make_planner(DEFAULT_PLANNER),
         setting.rules,
         np.random.default_rng(seed),
         heuristics=Heuristics.parse(heuristics),
@@ -137,8 +138,9 @@ def test_adaptability_alone_fails_with_a_reason() -> None:
     report = result.failure
     assert report is not None
     assert report.subgoal == 1
-    assert "graspWith(Ham,LeftHand) (0 of 3 worked)" in report.tried
-    assert report.missing[0].literal == "inHand(Ham,LeftHand)"
+    assert report.attempts == (Attempts("graspWith(Ham,LeftHand)", 3, 0),)
+    assert report.diagnosis.verdict is Verdict.UNLIKELY
+    assert str(report.diagnosis.literals[0].literal) == "inHand(Ham,LeftHand)"
     assert "should do it, but did not work" in str(report)
 
 
@@ -180,7 +182,7 @@ def test_a_vanished_object_ends_with_its_name() -> None:
     setting = Setting.load("simple")
     env = Seeing(setting.domain, setting.scene, setting.rules, meddle=vanish)
     task = setting.understand(SANDWICH)
-    cycle = PlanningCycle(env, WorldModel(), make_planner("a-prada"), setting.rules, np.random.default_rng(0))
+    cycle = PlanningCycle(env, WorldModel(), make_planner(DEFAULT_PLANNER), setting.rules, np.random.default_rng(0))
     result = cycle.run(task.goals, env.reset(0))
     assert result.reason is EndReason.MISSING_OBJECT
     assert "on(Bun-top,Ham) (no rule makes it true with what is here)" in str(result.failure)
@@ -199,7 +201,7 @@ def test_a_goal_that_does_not_last_is_not_reached() -> None:
     cycle = PlanningCycle(
         env,
         WorldModel(),
-        make_planner("a-prada"),
+        make_planner(DEFAULT_PLANNER),
         setting.rules,
         np.random.default_rng(0),
         on_step=steps.append,
@@ -278,7 +280,7 @@ def test_several_rules_of_one_action() -> None:
     rules = parse_rules(text[:start] + split + other + text[end:])
     environment = SymbolicEnvironment(setting.domain, setting.scene, rules)
     task = setting.understand("grasp the ham with the left hand, then the top bun with the right hand")
-    cycle = PlanningCycle(environment, WorldModel(), make_planner("a-prada"), rules, np.random.default_rng(0))
+    cycle = PlanningCycle(environment, WorldModel(), make_planner(DEFAULT_PLANNER), rules, np.random.default_rng(0))
     result = cycle.run(task.goals, environment.reset(0))
     assert (result.success, result.good, result.total) == (True, 2, 2)
 

@@ -8,6 +8,7 @@ import pytest
 from cognitive_arch.planning import kernels
 from cognitive_arch.planning.prada import APrada, Prada
 from cognitive_arch.planning.problem import compile_problem
+from cognitive_arch.planning.sampling import sample_sequences
 from cognitive_arch.relational.parser import parse_rules
 from cognitive_arch.relational.rules import Entity, GroundRule
 from cognitive_arch.relational.symbols import State
@@ -41,7 +42,7 @@ def toy() -> tuple[GroundRule, ...]:
 def evaluate(rules: tuple[GroundRule, ...], start: State, goal: str, steps: int) -> tuple[float, float]:
     problem = compile_problem(start, literals(goal), rules)
     sequence = np.zeros(steps, dtype=np.int32)
-    value, peak, _ = kernels.evaluate_sequence(*problem.arrays(), sequence, 0.95, 0.03)
+    value, peak, _ = kernels.evaluate_sequence(problem.arrays, sequence, 0.95, 0.03)
     return value, peak
 
 
@@ -58,7 +59,7 @@ def test_two_steps_with_two_rules_of_one_action() -> None:
     # q' = (1 - 0.16 - 0.36) 0.6 + 0.16 (0.6 + (1 - 0.7) 0.6) + 0.36 * 0.6 = 0.6288
     # p' = (1 - 0.16 - 0.36) 0.4 + 0.16 (1 - 0.6) 0.4 + 0.36 (0.5 + (1 - 0.5) 0.4)
     problem = compile_problem(state("p(X)", "r(X)"), literals("q(X)"), toy())
-    _, peak, belief = kernels.evaluate_sequence(*problem.arrays(), np.zeros(2, dtype=np.int32), 0.95, 0.03)
+    _, peak, belief = kernels.evaluate_sequence(problem.arrays, np.zeros(2, dtype=np.int32), 0.95, 0.03)
     after = dict(zip(map(str, problem.atoms), belief, strict=True))
     assert after["q(X)"] == pytest.approx(0.6288)
     assert peak == pytest.approx(0.6288)
@@ -79,17 +80,17 @@ def test_small_weights_are_cut() -> None:
     ).ground([Entity("X", "t")])
     problem = compile_problem(state(), literals("q(X)"), rules)
     sequence = np.array([0, 1], dtype=np.int32)
-    _, cut, _ = kernels.evaluate_sequence(*problem.arrays(), sequence, 0.95, 0.03)
-    _, kept, _ = kernels.evaluate_sequence(*problem.arrays(), sequence, 0.95, 0.0)
+    _, cut, _ = kernels.evaluate_sequence(problem.arrays, sequence, 0.95, 0.03)
+    _, kept, _ = kernels.evaluate_sequence(problem.arrays, sequence, 0.95, 0.0)
     assert (cut, kept) == (0.0, pytest.approx(0.02))
 
 
 def test_static_literals_are_decided_at_compile_time(ground: tuple[GroundRule, ...], start: State) -> None:
     problem = compile_problem(start, literals("inHand(Ham,LeftHand)"), ground)
-    assert problem.n_rules == len(ground)
+    assert len(problem.rules) == len(ground)
     no_hands = frozenset(a for a in start if a.predicate != "isHand")
     # Without isHand no grasp and no drop can ever apply; only the twelve puts do not ask for it.
-    assert compile_problem(no_hands, literals("inHand(Ham,LeftHand)"), ground).n_rules == 12
+    assert len(compile_problem(no_hands, literals("inHand(Ham,LeftHand)"), ground).rules) == 12
 
 
 def test_beliefs_stay_probabilities(ground: tuple[GroundRule, ...], start: State) -> None:
@@ -97,7 +98,7 @@ def test_beliefs_stay_probabilities(ground: tuple[GroundRule, ...], start: State
     rng = np.random.default_rng(1)
     for _ in range(200):
         sequence = rng.integers(0, len(problem.actions) + 1, 10).astype(np.int32)
-        _, peak, belief = kernels.evaluate_sequence(*problem.arrays(), sequence, 0.95, 0.03)
+        _, peak, belief = kernels.evaluate_sequence(problem.arrays, sequence, 0.95, 0.03)
         assert belief.min() >= 0
         assert belief.max() <= 1
         assert 0 <= peak <= 1
@@ -105,22 +106,22 @@ def test_beliefs_stay_probabilities(ground: tuple[GroundRule, ...], start: State
 
 def test_do_nothing_is_never_first(ground: tuple[GroundRule, ...], start: State) -> None:
     problem = compile_problem(start, literals("inHand(Ham,LeftHand)"), ground)
-    draws = np.random.default_rng(0).random((500, 4))
-    draws[0] = np.nextafter(1.0, 0.0)  # the largest draw there is must not fall off the end of the list
-    sequences, values, peaks = kernels.sample_sequences(*problem.arrays(), draws, 0.95, 0.03)
+    draws = np.random.default_rng(0).random((4, 500))
+    draws[:, 0] = np.nextafter(1.0, 0.0)  # the largest draw there is must not fall off the end of the list
+    sequences, values, peaks = sample_sequences(problem.arrays, None, draws, 0.95, 0.03)
     idle = len(problem.actions)
-    assert (sequences[:, 0] < idle).all()
-    assert (sequences[:, 1:] == idle).any()
+    assert (sequences[0] < idle).all()
+    assert (sequences[1:] == idle).any()
     assert np.isfinite(values).all()
     assert (peaks <= 1).all()
 
 
 def test_sampled_values_are_those_of_their_sequences(ground: tuple[GroundRule, ...], start: State) -> None:
     problem = compile_problem(start, literals("on(Ham,Bun-bottom)"), ground)
-    draws = np.random.default_rng(2).random((200, 5))
-    sequences, values, peaks = kernels.sample_sequences(*problem.arrays(), draws, 0.95, 0.03)
-    for sequence, value, peak in zip(sequences, values, peaks, strict=True):
-        expected = kernels.evaluate_sequence(*problem.arrays(), sequence, 0.95, 0.03)
+    draws = np.random.default_rng(2).random((5, 200))
+    sequences, values, peaks = sample_sequences(problem.arrays, None, draws, 0.95, 0.03)
+    for sequence, value, peak in zip(sequences.T.copy(), values, peaks, strict=True):
+        expected = kernels.evaluate_sequence(problem.arrays, sequence, 0.95, 0.03)
         assert (value, peak) == pytest.approx(expected[:2])
 
 
@@ -131,9 +132,9 @@ def test_actions_are_drawn_in_proportion_to_their_weights() -> None:
         "rule b(x: t)\n  outcomes\n    1 q(x)\n"
     ).ground([Entity("X", "t"), Entity("Y", "t"), Entity("Z", "t")])
     problem = compile_problem(state(), literals("p(X)"), rules)
-    draws = np.random.default_rng(3).random((12_000, 1))
-    sequences, _, _ = kernels.sample_sequences(*problem.arrays(), draws, 0.95, 0.03)
-    shares = np.bincount(sequences[:, 0], minlength=6) / len(draws)
+    draws = np.random.default_rng(3).random((1, 12_000))
+    sequences, _, _ = sample_sequences(problem.arrays, None, draws, 0.95, 0.03)
+    shares = np.bincount(sequences[0], minlength=6) / 12_000
     assert shares == pytest.approx([1 / 6] * 6, abs=0.012)
 
 
