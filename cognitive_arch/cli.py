@@ -145,12 +145,12 @@ def plan(
     as_json: Json = False,
 ) -> None:
     """Plan once, without acting: for a scene, or for a problem in libPRADA's files."""
-    from cognitive_arch import dry_run
+    from cognitive_arch import dry_run, report
 
     settings = dry_run.PlanSettings(planner, horizon, samples, seed, repeat, evaluate)
     load = dry_run.loader(sentence, scene, goal, state, rules, symbols)
     if actions is None:
-        answer = dry_run.plan_once(load, settings, lambda text: print(text, file=sys.stderr, flush=True))
+        answer = dry_run.plan_once(load, settings, report.notice)
     else:
         answer = dry_run.evaluate_given(load, actions, settings)
     _print(answer, dry_run.plan_text(answer), as_json)

@@ -89,13 +89,18 @@ class _Terminal(Console):
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
+def notice(text: str) -> None:
+    """Something the user should know while waiting; never on stdout."""
+    print(text, file=sys.stderr, flush=True)
+
+
 class LiveProgress:
     """Tells on the terminal what is going on: to stderr when `quiet` leaves stdout to a program."""
 
     def __init__(self, quiet: bool) -> None:
         self._console = _Terminal(stderr=quiet, highlight=False, soft_wrap=True)
         self._status = Console(stderr=True).status("getting ready")
-        self.progress = Progress(on_task=self._task, on_act=self._act, on_step=self._step)
+        self.progress = Progress(self._task, self._act, self._step, notice)
 
     def __enter__(self) -> LiveProgress:
         if self._animated:

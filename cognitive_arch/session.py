@@ -22,6 +22,7 @@ from cognitive_arch.language.goals import GoalCompiler
 from cognitive_arch.language.instruction import parse_instruction
 from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
 from cognitive_arch.planning.base import Planner
+from cognitive_arch.planning.compilation import warm_up
 from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
@@ -147,6 +148,7 @@ class Progress:
     on_task: Callable[[Task], None] = lambda task: None
     on_act: Callable[[GroundAction], None] = lambda action: None
     on_step: Callable[[Step], None] = lambda step: None
+    on_notice: Callable[[str], None] = lambda text: None
 
 
 class Session:
@@ -222,6 +224,7 @@ def run_task(
     try:
         _check_skills(task, config.backend, environment)
         session = Session(config, setting, environment)
+        warm_up(make_planner(config.planner), progress.on_notice)
         with RunStore(store_folder, create=True) as store:
             progress.on_task(task)
             with store.begin(f"{setting.scene.name}-{config.backend}-{config.seed}", manifest) as run:

@@ -62,9 +62,11 @@ class LiteralDiagnosis:
     roots: tuple[Literal, ...]
 
     def __str__(self) -> str:
-        if self.action is None:
-            return f"{self.literal} (no rule makes it true with what is here)"
         unmet = ", ".join(map(str, self.unmet))
+        if self.status is LiteralStatus.NO_RULE:
+            return f"{self.literal} (no rule makes it true with what is here)"
+        if self.action is None:
+            return f"{self.literal} (it follows from {unmet})"
         if self.status is LiteralStatus.REACHABLE:
             return f"{self.literal} ({self.action} would do it{f', but needs {unmet}' if unmet else ''})"
         deeper = [str(root) for root in self.roots if root not in self.unmet]
