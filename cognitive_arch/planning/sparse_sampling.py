@@ -73,7 +73,7 @@ class SparseSampling(ArrayPlanner):
         graph = Graph(*_look_ahead(problem.arrays, draws, horizon, self.branch))
         if graph.layers[0] == 0:
             raise PlanningError(f"max_nodes is {self.max_nodes}, which is too low for a single step")
-        _value(problem.arrays, graph, horizon, self.discount, self.noise_scale)
+        _value(problem.arrays, graph, horizon, float(self.discount), float(self.noise_scale))
         return graph
 
 

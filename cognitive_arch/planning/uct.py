@@ -78,7 +78,9 @@ class Uct(ArrayPlanner):
 
     def _search(self, problem: Problem, horizon: int, rng: np.random.Generator) -> Tree:
         draws = rng.random((self.samples, horizon, 2))
-        return Tree(*_run_episodes(problem.arrays, draws, self.discount, self.noise_scale, self.exploration))
+        # As floats, lest an integer setting has the kernel compiled anew.
+        settings = map(float, (self.discount, self.noise_scale, self.exploration))
+        return Tree(*_run_episodes(problem.arrays, draws, *settings))
 
 
 class Tree(NamedTuple):
