@@ -41,6 +41,7 @@ lint: setup
 
 bench: setup
 	$(PY) benchmarks/run.py
+	$(PY) -m benchmarks.planner
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

@@ -1,0 +1,1 @@
+"""Measurements that cannot fail a test: `make bench`."""
