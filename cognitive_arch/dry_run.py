@@ -176,7 +176,7 @@ def plan_once(
         "goal_probability": result.goal_probability,
         "goal": list(map(str, task.goal)),
         "horizon": settings.horizon,
-        "samples": getattr(planner, "samples", settings.samples),
+        "samples": getattr(planner, "samples", None),
         "seed": settings.seed,
         "repeat": settings.repeat,
         "n_rules": len(problem.rules),
@@ -268,8 +268,9 @@ def plan_text(answer: dict[str, Any]) -> str:
     if "planner" in answer:
         lines += [
             f"estimate     probability {answer['goal_probability']:.3f}, value {answer['value']:.3f}",
-            f"planner      {answer['planner']}, horizon {answer['horizon']}, {answer['samples']} samples, "
-            f"seed {answer['seed']}",
+            f"planner      {answer['planner']}, horizon {answer['horizon']}, "
+            + (f"at most {answer['samples']} samples, " if answer["samples"] else "")
+            + f"seed {answer['seed']}",
             f"size         {answer['n_rules']} ground rules, {answer['n_atoms']} atoms",
             f"time         setup {1e3 * answer['setup_s']:.1f} ms, planning {1e3 * answer['cpu_s']:.1f} ms",
         ]

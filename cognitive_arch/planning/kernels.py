@@ -21,6 +21,9 @@ BLOCK = 32
 CLOSURE_CUT = 0.01
 """Chains less likely than this are not followed any further (as in libPRADA)."""
 
+CLOSURE_STEPS = 20_000
+"""Nor are more links than this looked at for one pair: among many certain links chains are legion."""
+
 ATOMS, RULES, ACTIONS, ROUND = range(4)
 """Which entry of `Scratch.length` holds the length of which trail, and the running number of the refresh."""
 
@@ -208,25 +211,28 @@ def derived_probability(kind, row, prob):  # type: ignore[no-untyped-def]
 def closure_probability(row, prob, source, target):  # type: ignore[no-untyped-def]
     """Probability that some chain leads from `source` to `target`, chains taken as independent."""
     n = row[0]
-    none = 1.0
+    none = 1.0 - prob[2 * row[1 + source * n + target] + 1]
     path = np.empty(n + 1, np.int32)  # entities of the chain so far
     upto = np.empty(n + 1)  # its probability
     following = np.zeros(n + 1, np.int32)  # which entity to try next at each depth
     used = np.zeros(n, np.bool_)
-    path[0], upto[0], used[source], depth = source, 1.0, source != target, 0
-    while depth >= 0:
+    path[0], upto[0], used[source], used[target] = source, 1.0, True, True
+    depth = steps = 0
+    while depth >= 0 and none > 0.0 and steps < CLOSURE_STEPS:
+        steps += 1
         nxt = following[depth]
         if nxt == n:
-            used[path[depth]] = False
+            if depth > 0:
+                used[path[depth]] = False
             depth -= 1
             continue
         following[depth] += 1
         chain = upto[depth] * prob[2 * row[1 + path[depth] * n + nxt] + 1]
-        if nxt == target:
-            none *= 1.0 - chain
-        elif chain > CLOSURE_CUT and not used[nxt] and nxt != source:
-            depth += 1
-            path[depth], upto[depth], following[depth], used[nxt] = nxt, chain, 0, True
+        if not used[nxt] and chain > 0.0:
+            none *= 1.0 - chain * prob[2 * row[1 + nxt * n + target] + 1]
+            if chain > CLOSURE_CUT:
+                depth += 1
+                path[depth], upto[depth], following[depth], used[nxt] = nxt, chain, 0, True
     return 1.0 - none
 
 

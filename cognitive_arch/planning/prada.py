@@ -48,6 +48,9 @@ class Prada(ArrayPlanner):
     def __post_init__(self) -> None:
         if self.samples < 1:
             raise PlanningError(f"{self.samples} samples are too few; valid: 1 or more")
+        # A whole number would have the kernels compiled once more.
+        object.__setattr__(self, "discount", float(self.discount))
+        object.__setattr__(self, "threshold", float(self.threshold))
 
     def solve(self, problem: Problem, horizon: int, rng: np.random.Generator) -> PlanResult:
         """See `ArrayPlanner.solve`."""

@@ -81,9 +81,7 @@ class Problem:
         return _select(self, rules, np.ones(len(self.arrays.context), dtype=np.bool_))
 
 
-def compile_problem(
-    state: State, goal: Goal, rules: Sequence[GroundRule], simplify: bool = True
-) -> Problem:
+def compile_problem(state: State, goal: Goal, rules: Sequence[GroundRule], simplify: bool = True) -> Problem:
     """Flatten `rules` for one state and goal; derived atoms are worked out here.
 
     To `simplify`, literals over atoms that no rule changes are decided here: a true one is a factor 1, a
@@ -136,7 +134,7 @@ def _encode(key: _Same) -> tuple[Problem, Mask]:
     coder = _Coder()
     contexts = [coder.codes(rule.context) for rule in rules]
     outcomes = [outcome for rule in rules for outcome in rule.outcomes]
-    changes = [coder.codes(outcome.literals) for outcome in outcomes]
+    changes = [_consistent(coder.codes(outcome.literals)) for outcome in outcomes]
     for definition in definitions:
         for atom in (*_looked_at(definition), *definition.defines):
             coder.index.setdefault(atom, len(coder.index))
@@ -195,6 +193,13 @@ class _Coder:
                 known[id(literal)] = code
             row.append(code)
         return row
+
+
+def _consistent(codes: list[int]) -> list[int]:
+    """One literal per atom; where an outcome names both signs, what it makes true is true."""
+    if len({code >> 1 for code in codes}) == len(codes):
+        return codes
+    return [code for code in dict.fromkeys(codes) if code & 1 or code + 1 not in codes]
 
 
 def _select(problem: Problem, keep: Mask, entries: Mask) -> Problem:

@@ -7,17 +7,23 @@ A package adds a planner through the entry point group `cognitive_arch.planners`
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib.metadata import entry_points
+from inspect import signature
 
 from cognitive_arch.errors import PlanningError, one_line, unknown
 from cognitive_arch.planning.base import Planner
 from cognitive_arch.planning.guided import GuidedPrada
 from cognitive_arch.planning.prada import APrada, Prada
+from cognitive_arch.planning.sparse_sampling import SparseSampling
+from cognitive_arch.planning.uct import Uct
 
 PLANNERS: Mapping[str, Callable[[], Planner]] = {
     "a-prada": APrada,
     "guided-prada": GuidedPrada,
     "prada": Prada,
+    "sst": SparseSampling,
+    "uct": Uct,
 }
 """Our own planners: name -> constructor with default settings."""
 
@@ -32,17 +38,15 @@ def planner_names() -> tuple[str, ...]:
 
 
 def make_planner(name: str, samples: int | None = None) -> Planner:
-    """The planner called `name`, drawing `samples` samples (None: as many as it does by default).
+    """The planner called `name`, drawing `samples` samples if it is one that has such a setting.
 
     Raises `PlanningError` listing the known ones, or saying why one of another package cannot be used.
     """
     make = PLANNERS.get(name) or _added(name)
-    if samples is None:
-        return make()
-    try:
-        return make(samples=samples)  # type: ignore[call-arg]
-    except TypeError:
-        raise PlanningError(f"the planner '{name}' has no setting 'samples'") from None
+    if samples is not None and "samples" in signature(make).parameters:
+        planner: Planner = partial(make, **{"samples": samples})()
+        return planner
+    return make()
 
 
 def _added(name: str) -> Callable[[], Planner]:

@@ -182,7 +182,9 @@ def test_a_vanished_object_ends_with_its_name() -> None:
     setting = Setting.load("simple")
     env = Seeing(setting.domain, setting.scene, setting.rules, meddle=vanish)
     task = setting.understand(SANDWICH)
-    cycle = PlanningCycle(env, WorldModel(), make_planner(DEFAULT_PLANNER), setting.rules, np.random.default_rng(0))
+    cycle = PlanningCycle(
+        env, WorldModel(), make_planner(DEFAULT_PLANNER), setting.rules, np.random.default_rng(0)
+    )
     result = cycle.run(task.goals, env.reset(0))
     assert result.reason is EndReason.MISSING_OBJECT
     assert "on(Bun-top,Ham) (no rule makes it true with what is here)" in str(result.failure)
@@ -280,7 +282,9 @@ def test_several_rules_of_one_action() -> None:
     rules = parse_rules(text[:start] + split + other + text[end:])
     environment = SymbolicEnvironment(setting.domain, setting.scene, rules)
     task = setting.understand("grasp the ham with the left hand, then the top bun with the right hand")
-    cycle = PlanningCycle(environment, WorldModel(), make_planner(DEFAULT_PLANNER), rules, np.random.default_rng(0))
+    cycle = PlanningCycle(
+        environment, WorldModel(), make_planner(DEFAULT_PLANNER), rules, np.random.default_rng(0)
+    )
     result = cycle.run(task.goals, environment.reset(0))
     assert (result.success, result.good, result.total) == (True, 2, 2)
 

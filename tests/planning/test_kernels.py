@@ -2,16 +2,24 @@
 
 from __future__ import annotations
 
+import os
+import runpy
+import shutil
+import time
+from pathlib import Path
+
 import numpy as np
 import pytest
 
+from cognitive_arch import planning
 from cognitive_arch.planning import kernels
 from cognitive_arch.planning.prada import APrada, Prada
 from cognitive_arch.planning.problem import compile_problem
 from cognitive_arch.planning.sampling import sample_sequences
+from cognitive_arch.relational.derived import Closure
 from cognitive_arch.relational.parser import parse_rules
-from cognitive_arch.relational.rules import Entity, GroundRule
-from cognitive_arch.relational.symbols import State
+from cognitive_arch.relational.rules import Entity, GroundOutcome, GroundRule, GroundRules
+from cognitive_arch.relational.symbols import Atom, GroundAction, Literal, State
 from tests.conftest import literals, state
 
 TWO_RULES = """
@@ -145,3 +153,43 @@ def test_shortening_raises_the_value(ground: tuple[GroundRule, ...], start: Stat
         shortened = APrada(samples=300).plan(start, goal, ground, 8, np.random.default_rng(seed))
         assert shortened.value >= plain.value - 1e-12
         assert len(shortened.actions) <= len(plain.actions)
+
+
+def test_an_outcome_that_says_a_thing_twice_or_both_ways() -> None:
+    atom = Atom("p", ())
+    for said, chance in (((True, True), 0.5), ((True, False), 0.5), ((False, True), 0.5)):
+        outcome = GroundOutcome(0.5, tuple(Literal(atom, sign) for sign in said))
+        rule = GroundRule(GroundAction("a", ()), (), (outcome,))
+        problem = compile_problem(frozenset(), (Literal(atom),), (rule,))
+        _, peak, _ = kernels.evaluate_sequence(problem.arrays, np.zeros(1, np.int32), 0.95, 0.03)
+        assert peak == chance
+
+
+def test_many_certain_links_do_not_take_for_ever() -> None:
+    """Thirteen things, each but the last on every other: no chain to the last, and legions of chains."""
+    things = tuple(f"t{i:02d}" for i in range(13))
+    links = frozenset(Atom("on", (x, y)) for x in things for y in things[:-1] if x != y)
+    rule = GroundRule(
+        GroundAction("put", ()), (), (GroundOutcome(0.5, (Literal(Atom("on", (things[0], things[-1]))),)),)
+    )
+    rules = GroundRules([rule], (Closure("above", "on", things),))
+    problem = compile_problem(links, (Literal(Atom("above", (things[1], things[-1]))),), rules)
+    _, peak, _ = kernels.evaluate_sequence(problem.arrays, np.zeros(1, np.int32), 0.95, 0.03)
+    assert 0.4 < peak <= 1
+
+
+def test_stale_kernels_are_dropped(tmp_path: Path) -> None:
+    """A fresh copy of the package notices that a kernel is older than one of the modules it calls."""
+    package = tmp_path / "planning"
+    (package / "__pycache__").mkdir(parents=True)
+    shutil.copy(planning.__file__, package / "__init__.py")
+    (package / "kernels.py").write_text("")
+    old, new = package / "__pycache__" / "old.nbi", package / "__pycache__" / "new.nbi"
+    for path in (old, new):
+        path.write_text("")
+    os.utime(old, (1, 1))
+    later = time.time() + 10
+    os.utime(new, (later, later))
+    runpy.run_path(str(package / "__init__.py"))
+    assert not old.exists()
+    assert new.exists()
