@@ -82,7 +82,7 @@ def make_scratch(p, threshold, horizon):  # type: ignore[no-untyped-def]
     return s
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _context_probability(p, prob, rule, threshold):  # type: ignore[no-untyped-def]
     """Product of the context's marginals, cut to 0 below `threshold`."""
     weight = 1.0
@@ -93,7 +93,7 @@ def _context_probability(p, prob, rule, threshold):  # type: ignore[no-untyped-d
     return weight
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _weigh_action(p, s, action):  # type: ignore[no-untyped-def]
     """Weights of the action's rules (no sibling applies) and the mass it is sampled with."""
     start, stop = p.action_ptr[action], p.action_ptr[action + 1]
@@ -109,7 +109,7 @@ def _weigh_action(p, s, action):  # type: ignore[no-untyped-def]
     s.mass[action] = mass
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _sum_block(s, b):  # type: ignore[no-untyped-def]
     total = 0.0
     for action in range(b * BLOCK, min((b + 1) * BLOCK, len(s.mass))):
@@ -117,7 +117,7 @@ def _sum_block(s, b):  # type: ignore[no-untyped-def]
     s.block[b] = total
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def goal_probability(p, prob):  # type: ignore[no-untyped-def]
     """Product of the goal literals' marginals."""
     probability = 1.0
@@ -126,7 +126,7 @@ def goal_probability(p, prob):  # type: ignore[no-untyped-def]
     return probability
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def believe(s, atom, new):  # type: ignore[no-untyped-def]
     """Set the marginal of `atom`, leaving a trail."""
     old = s.prob[2 * atom + 1]
@@ -138,7 +138,7 @@ def believe(s, atom, new):  # type: ignore[no-untyped-def]
         s.length[ATOMS] += 1
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def advance(p, s, action):  # type: ignore[no-untyped-def]
     """Propagate the belief through `action`."""
     start, stop = p.action_ptr[action], p.action_ptr[action + 1]
@@ -236,7 +236,7 @@ def closure_probability(row, prob, source, target):  # type: ignore[no-untyped-d
     return 1.0 - none
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def refresh(p, s, threshold, mark):  # type: ignore[no-untyped-def]
     """Weigh again the rules and actions that the atoms on the trail from `mark` on bear on."""
     s.length[ROUND] += 1
@@ -262,7 +262,7 @@ def refresh(p, s, threshold, mark):  # type: ignore[no-untyped-def]
     _weigh_actions(p, s, first)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _weigh_actions(p, s, mark):  # type: ignore[no-untyped-def]
     """Weigh the actions on the trail from `mark` on, and sum their blocks."""
     for i in range(mark, s.length[ACTIONS]):
@@ -274,7 +274,7 @@ def _weigh_actions(p, s, mark):  # type: ignore[no-untyped-def]
             _sum_block(s, summed)
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def undo(p, s, atoms, rules, actions):  # type: ignore[no-untyped-def]
     """Go back to where the three trails had these lengths."""
     for i in range(s.length[ATOMS] - 1, atoms - 1, -1):

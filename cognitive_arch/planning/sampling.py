@@ -20,7 +20,7 @@ from cognitive_arch.planning.kernels import (
 from cognitive_arch.planning.relaxed import make_costs
 
 
-@numba.njit(cache=True, nogil=True, inline="always")
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def draw_action(s, u, may_idle):  # type: ignore[no-untyped-def]
     """An action in proportion to its mass, by `u` in [0, 1); n_actions if that is to do nothing.
 
