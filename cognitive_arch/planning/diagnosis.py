@@ -144,6 +144,7 @@ class _Inquiry:
     costs: Costs
 
     def literal(self, code: int) -> LiteralDiagnosis:
+        """How one literal of the goal stands that does not hold."""
         makers = self._makers(code)
         literal = self.problem.literal(code)
         if not len(makers):

@@ -86,7 +86,7 @@ def sample_sequences(p, guidance, draws, discount, threshold):  # type: ignore[n
     goal, value, peak = np.zeros(horizon + 1), np.zeros(horizon + 1), np.zeros(horizon + 1)
     goal[0] = value[0] = peak[0] = goal_probability(p, s.prob)
     depth, fresh = 0, True
-    while depth >= 0:
+    while True:
         if fresh:
             if guidance is None:
                 for i in range(lo[depth], hi[depth]):
@@ -96,43 +96,42 @@ def sample_sequences(p, guidance, draws, discount, threshold):  # type: ignore[n
                         depth > 0, choices[depth])  # fmt: skip
             _sort_by(choices[depth], order, lo[depth], hi[depth])
             fresh = False
-        if lo[depth] == hi[depth]:
+        if lo[depth] < hi[depth]:
+            first = lo[depth]
+            choice = choices[depth, order[first]]
+            end = first + 1
+            while end < hi[depth] and choices[depth, order[end]] == choice:
+                end += 1
+            lo[depth] = end
+            for trail in range(3):
+                marks[depth, trail] = s.length[trail]
+            action = choice
+            if guidance is not None:
+                action = guidance.action[choice]
+                marks[depth, 3] = world.length[0]
+                if depth + 1 < horizon:
+                    imagine(p, guidance, world, choice)
+            goal[depth + 1] = goal[depth]
+            if action != idle:
+                advance(p, s, action)
+                if depth + 1 < horizon:
+                    refresh(p, s, threshold, marks[depth, ATOMS])
+                goal[depth + 1] = goal_probability(p, s.prob)
+            value[depth + 1] = value[depth] + discount ** (depth + 1) * goal[depth + 1]
+            peak[depth + 1] = max(peak[depth], goal[depth + 1])
+            if depth + 1 < horizon:
+                depth, fresh = depth + 1, True
+                lo[depth], hi[depth] = first, end
+                continue
+            for i in range(first, end):
+                values[order[i]], peaks[order[i]] = value[horizon], peak[horizon]
+        else:
             depth -= 1
-            if depth >= 0:
-                undo(p, s, marks[depth, ATOMS], marks[depth, RULES], marks[depth, ACTIONS])
-                if guidance is not None:
-                    forget(guidance, world, marks[depth, 3])
-            continue
-        first = lo[depth]
-        choice = choices[depth, order[first]]
-        end = first + 1
-        while end < hi[depth] and choices[depth, order[end]] == choice:
-            end += 1
-        lo[depth] = end
-        for trail in range(3):
-            marks[depth, trail] = s.length[trail]
-        action = choice
-        if guidance is not None:
-            action = guidance.action[choice]
-            marks[depth, 3] = world.length[0]
-            if depth + 1 < horizon:
-                imagine(p, guidance, world, choice)
-        goal[depth + 1] = goal[depth]
-        if action != idle:
-            advance(p, s, action)
-            if depth + 1 < horizon:
-                refresh(p, s, threshold, marks[depth, ATOMS])
-            goal[depth + 1] = goal_probability(p, s.prob)
-        value[depth + 1] = value[depth] + discount ** (depth + 1) * goal[depth + 1]
-        peak[depth + 1] = max(peak[depth], goal[depth + 1])
-        if depth + 1 < horizon:
-            depth, fresh = depth + 1, True
-            lo[depth], hi[depth] = first, end
-            continue
-        for i in range(first, end):
-            values[order[i]], peaks[order[i]] = value[horizon], peak[horizon]
+            if depth < 0:
+                return choices, values, peaks
         undo(p, s, marks[depth, ATOMS], marks[depth, RULES], marks[depth, ACTIONS])
-    return choices, values, peaks
+        if guidance is not None:
+            forget(guidance, world, marks[depth, 3])
 
 
 @numba.njit(cache=True, nogil=True)

@@ -44,6 +44,7 @@ class _SymbolsFile:
         self.reader = LiteralReader(source, self.symbols)
 
     def read(self) -> SymbolTable:
+        """The whole file."""
         definitions: list[tuple[Symbol, Line]] = []
         for line in self.source.lines():
             declaration, arrow, definition = line.text.partition(_ARROW)
@@ -64,6 +65,7 @@ class _SymbolsFile:
         return self.source.fail(line.number, problem)
 
     def declare(self, line: Line) -> Symbol:
+        """One declaration, without what follows its arrow."""
         if line.text.startswith("["):
             raise self.fail(line, f"argument types are not read; valid: {_FORM}")
         words = line.text.split(maxsplit=4)
