@@ -248,16 +248,20 @@ def relevant_rules(problem: Problem, operators: Operators, cost: Floats) -> NDAr
     """Which rules (n_rules,) can matter: they can come to apply, and lead towards the goal.
 
     `cost` is that of `literal_costs` from the start. A rule leads towards the goal if it adds a literal
-    that the goal or the context of such a rule asks for.
+    that the goal or the context of such a rule asks for, or one that keeps a sibling of such a rule from
+    applying, for rules of one action that apply together cancel out.
     """
-    o = operators
-    reachable = np.ones(len(o.cost), dtype=np.bool_)
+    o, a = operators, problem.arrays
     owner = np.repeat(np.arange(len(o.cost)), np.diff(o.need_ptr))
-    reachable[owner[cost[o.need] >= NEVER]] = False
-    wanted = np.zeros(len(problem.arrays.start), dtype=np.bool_)
-    wanted[problem.arrays.goal] = True
     adder = np.repeat(np.arange(len(o.cost)), np.diff(o.add_ptr))
+    reader = np.repeat(np.arange(len(a.rule_action)), np.diff(a.context_ptr))
+    has_siblings = np.diff(a.action_ptr)[a.rule_action] > 1
+    reachable = np.ones(len(o.cost), dtype=np.bool_)
+    reachable[owner[cost[o.need] >= NEVER]] = False
+    wanted = np.zeros(len(a.start), dtype=np.bool_)
+    wanted[a.goal] = True
     used = np.zeros(len(o.cost), dtype=np.bool_)
+    actions = np.zeros(len(problem.actions), dtype=np.bool_)
     while True:
         now = np.zeros_like(used)
         now[adder[wanted[o.add]]] = True
@@ -266,8 +270,8 @@ def relevant_rules(problem: Problem, operators: Operators, cost: Floats) -> NDAr
             break
         used = now
         wanted[o.need[used[owner]]] = True
-    rules = np.zeros(len(problem.arrays.rule_action), dtype=np.bool_)
-    rules[o.rule[used & (o.rule >= 0)]] = True
+        actions[a.rule_action[o.rule[used & (o.rule >= 0)]]] = True
+        rivals = actions[a.rule_action] & has_siblings
+        wanted[a.context[rivals[reader]] ^ 1] = True
     # Sibling rules shape each other's weights, so an action keeps all of its rules or none.
-    actions = np.unique(problem.arrays.rule_action[rules])
-    return np.isin(problem.arrays.rule_action, actions)
+    return actions[a.rule_action]
