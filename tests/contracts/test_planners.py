@@ -9,8 +9,8 @@ from cognitive_arch.errors import PlanningError
 from cognitive_arch.planning.base import Planner, PlanStatus
 from cognitive_arch.planning.registry import PLANNERS, make_planner
 from cognitive_arch.relational.parser import parse_rules
-from cognitive_arch.relational.rules import Entity, GroundRule
-from cognitive_arch.relational.symbols import Goal, State
+from cognitive_arch.relational.rules import Entity, GroundOutcome, GroundRule
+from cognitive_arch.relational.symbols import Atom, Goal, GroundAction, Literal, State
 from cognitive_arch.relational.transition import apply_literals, covering_rule
 from tests.conftest import literals, state
 
@@ -109,6 +109,37 @@ def test_names_do_not_matter(planner: Planner) -> None:
         results.append(planner.plan(state(), literals(f"q({name})"), rules, 4, rng()))
     assert [a.name for a in results[0].actions] == [a.name for a in results[1].actions]
     assert results[0].value == results[1].value
+
+
+def renamed(rules: tuple[GroundRule, ...], names: dict[str, str]) -> tuple[GroundRule, ...]:
+    """The same rules in the same order, about things of other names."""
+
+    def literal(lit: Literal) -> Literal:
+        return Literal(Atom(lit.atom.predicate, tuple(names[a] for a in lit.atom.args)), lit.positive)
+
+    return tuple(
+        GroundRule(
+            GroundAction(rule.action.name, tuple(names[a] for a in rule.action.args)),
+            tuple(map(literal, rule.context)),
+            tuple(GroundOutcome(o.probability, tuple(map(literal, o.literals))) for o in rule.outcomes),
+        )
+        for rule in rules
+    )
+
+
+def test_permuted_names_change_nothing(
+    planner: Planner, ground: tuple[GroundRule, ...], start: State, entities: tuple[Entity, ...]
+) -> None:
+    old = [entity.name for entity in entities]
+    names = dict(zip(old, reversed(old), strict=True))
+    goal = literals("on(Ham,Bun-bottom)", "isClear(LeftHand)")
+    other = tuple(Literal(Atom(a.predicate, tuple(names[x] for x in a.args)), sign) for a, sign in goal)
+    there = frozenset(Atom(a.predicate, tuple(names[x] for x in a.args)) for a in start)
+    first = planner.plan(start, goal, ground, 5, rng())
+    second = planner.plan(there, other, renamed(ground, names), 5, rng())
+    assert second.value == first.value
+    assert [a.name for a in second.actions] == [a.name for a in first.actions]
+    assert [a.args for a in second.actions] == [tuple(names[x] for x in a.args) for a in first.actions]
 
 
 def test_bad_problems(planner: Planner, ground: tuple[GroundRule, ...], start: State) -> None:
