@@ -39,6 +39,18 @@ StoreOption = Annotated[
 PlannerOption = Annotated[
     str, typer.Option(help="guided-prada, a-prada, prada, uct, sst, or one that another package adds.")
 ]
+RecordOption = Annotated[
+    bool, typer.Option("--record/--no-record", help="Keep a Meshcat recording and pictures (drake).")
+]
+EventOption = Annotated[
+    list[str],
+    typer.Option(
+        "--event",
+        metavar="STEP:KIND:NAME[:X,Y]",
+        help="What happens from outside before that step, such as 3:remove:Tomato, 2:move:Ham:-0.35,0.10, "
+        "4:add:Cheese:-0.3,0.1, 4:topple:Ham, 2:empty:LeftHand. May be given several times.",
+    ),
+]
 Sentence = Annotated[str, typer.Argument(help='What to do, for example "make a ham sandwich".')]
 
 
@@ -84,16 +96,16 @@ def run(
         float, typer.Option(help="Move the objects by up to this many metres, and turn them, at the start.")
     ] = 0.0,
     rules: RulesOption = None,
+    event: EventOption = [],  # noqa: B006 (typer wants a list)
     store: StoreOption = Path("runs"),
-    record: Annotated[
-        bool, typer.Option("--record/--no-record", help="Keep a Meshcat recording and pictures (drake).")
-    ] = True,
+    record: RecordOption = True,
     as_json: Json = False,
 ) -> None:
     """Do what a sentence asks for: look, plan, act, notice what went wrong, find another way."""
     from cognitive_arch import report
     from cognitive_arch.execution.heuristics import Heuristics
     from cognitive_arch.execution.noise import NoiseLevels
+    from cognitive_arch.outside import OutsideEvent
     from cognitive_arch.session import RunConfig, run_task
 
     config = RunConfig(
@@ -106,6 +118,7 @@ def run(
         jitter=jitter,
         rules=rules,
         record=record,
+        events=tuple(map(OutsideEvent.parse, event)),
     )
     with report.LiveProgress(quiet=as_json) as live:
         result = run_task(sentence, config, store, live.progress)

@@ -13,10 +13,19 @@ from typing import Annotated, Any, Literal
 
 import numpy as np
 import yaml
-from pydantic import BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    ValidationError,
+    field_validator,
+    model_validator,
+)
 
 from cognitive_arch import resources
 from cognitive_arch.errors import ConfigError, one_line, unknown
+from cognitive_arch.outside import Happening, OutsideEvent, check_events
 
 MIN_DISTANCE = 0.07  # metres between the centres of two objects that lie side by side
 
@@ -152,8 +161,20 @@ class ReachLimits(_Frozen):
     side: Annotated[float, Field(ge=0)] = 0.15
 
 
+def _event(value: object) -> OutsideEvent:
+    """An event of a scene file: the text that the command line takes, too."""
+    if isinstance(value, OutsideEvent):
+        return value
+    if not isinstance(value, str):
+        raise ValueError(f"an event is text such as 3:remove:Tomato, this is {type(value).__name__}")
+    try:
+        return OutsideEvent.parse(value)
+    except ConfigError as error:
+        raise ValueError(str(error)) from None
+
+
 class Scene(_Frozen):
-    """One `scenes/*.yaml`: which objects lie where when an episode starts."""
+    """One `scenes/*.yaml`: which objects lie where when an episode starts, and what happens meanwhile."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}$")]
     title: str = ""
@@ -161,6 +182,19 @@ class Scene(_Frozen):
     table: Table = Table()
     reach: ReachLimits = ReachLimits()
     objects: dict[Name, Placement] = Field(min_length=1)
+    events: tuple[Annotated[OutsideEvent, BeforeValidator(_event)], ...] = Field((), max_length=100)
+
+    @property
+    def things(self) -> tuple[str, ...]:
+        """Names of all objects that are there at some time, those of `add` events included, sorted."""
+        added = {event.name for event in self.events if event.kind is Happening.ADD}
+        return tuple(sorted(added | set(self.objects)))
+
+    def with_events(self, events: tuple[OutsideEvent, ...], domain: Domain) -> Scene:
+        """The scene with more events; raises `ConfigError` for those that cannot happen in it."""
+        scene = self.model_copy(update={"events": (*self.events, *events)})
+        check_events(scene.events, scene.objects, domain.objects)
+        return scene
 
 
 def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str, Placement]:
@@ -247,4 +281,8 @@ def load_scene(name_or_path: str) -> Scene:
     for name in scene.objects:
         if name not in domain.objects:
             raise ConfigError(f"{path}: {unknown('object', name, domain.objects)}")
+    try:
+        check_events(scene.events, scene.objects, domain.objects)
+    except ConfigError as error:
+        raise ConfigError(f"{path}: {error}") from None
     return scene

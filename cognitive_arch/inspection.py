@@ -74,6 +74,8 @@ def _run(run: Run, steps: list[dict[str, Any]], format_: str) -> View:
         f"planner {manifest['planner']}, heuristics {manifest['heuristics']}, noise {manifest['noise']}",
         "means        " + ", ".join(" ".join(triple) for triple in manifest["semantic"]),
     ]
+    if manifest.get("events"):
+        lines.append("outside      " + ", ".join(manifest["events"]))
     lines += [f"sub-goal {n}   {', '.join(goal)}" for n, goal in enumerate(manifest["subgoals"], 1)]
     lines += [text for text in map(step_text, steps) if text]
     lines.append(_ending(run, steps))

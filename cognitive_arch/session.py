@@ -21,6 +21,7 @@ from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.language.goals import GoalCompiler
 from cognitive_arch.language.instruction import parse_instruction
 from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
+from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.planning.base import Planner
 from cognitive_arch.planning.compilation import warm_up
 from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
@@ -73,10 +74,14 @@ class Setting:
     rules: RuleSet
 
     @classmethod
-    def load(cls, scene: str, rules: str | None = None) -> Setting:
-        """Read scene, domain and rules; `rules` is a file that replaces the domain's own."""
+    def load(cls, scene: str, rules: str | None = None, events: tuple[OutsideEvent, ...] = ()) -> Setting:
+        """Read scene, domain and rules; `rules` is a file that replaces the domain's own.
+
+        `events` happen besides those of the scene file.
+        """
         loaded = load_scene(scene)
         domain = load_domain(loaded.domain)
+        loaded = loaded.with_events(events, domain)
         path = domain.rules_path if rules is None else Path(rules)
         setting = cls(loaded, domain, load_rules(path))
         setting._check_rules()
@@ -126,6 +131,7 @@ class RunConfig:
     jitter: float = 0.0
     rules: str | None = None
     record: bool = True
+    events: tuple[OutsideEvent, ...] = ()
 
     def __post_init__(self) -> None:
         if not 0 <= self.seed < 2**63:
@@ -138,7 +144,8 @@ class RunConfig:
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for the manifest."""
-        return asdict(self) | {"noise": str(self.noise), "heuristics": str(self.heuristics)}
+        texts = {"noise": str(self.noise), "heuristics": str(self.heuristics)}
+        return asdict(self) | texts | {"events": [str(event) for event in self.events]}
 
 
 @dataclass(frozen=True, slots=True)
@@ -154,7 +161,8 @@ class Progress:
 class Session:
     """One robot in one world, given one instruction after another.
 
-    The world model lasts from one instruction to the next, and so does what the hands hold.
+    The world model lasts from one instruction to the next, and so does what the hands hold. The outside
+    events of the scene happen during the first instruction.
     """
 
     def __init__(self, config: RunConfig, setting: Setting, environment: Environment) -> None:
@@ -167,6 +175,7 @@ class Session:
         self._world = WorldModel()
         self._observation = environment.reset(config.seed)
         self._world.update(self._observation)
+        self._events = setting.scene.events
 
     @property
     def world(self) -> WorldModel:
@@ -184,6 +193,7 @@ class Session:
     ) -> EpisodeResult:
         """Do `task`; returns when its goal holds or nothing is left to try."""
         self._world.begin_instruction()
+        events, self._events = self._events, ()
         cycle = PlanningCycle(
             self._environment,
             self._world,
@@ -192,6 +202,7 @@ class Session:
             self._rng,
             heuristics=self._heuristics,
             settings=settings,
+            outside=events,
             on_act=progress.on_act,
             on_step=progress.on_step,
         )
@@ -209,9 +220,11 @@ def run_task(
     Raises a `CogArchError` for anything wrong with the input, before anything is written.
     """
     started = time.perf_counter()
-    setting = Setting.load(config.scene, config.rules)
+    setting = Setting.load(config.scene, config.rules, config.events)
+    events = [str(event) for event in setting.scene.events]
     task = setting.understand(sentence)
-    manifest = {"instruction": task.instruction, **config.to_json(), **task.to_json(), "versions": versions()}
+    manifest = {"instruction": task.instruction, **config.to_json(), **task.to_json()}
+    manifest |= {"events": events, "versions": versions()}
     environment = make_environment(
         config.backend,
         setting.domain,
@@ -252,6 +265,7 @@ def run_task(
         "planner": config.planner,
         "heuristics": str(config.heuristics),
         "noise": str(config.noise),
+        "events": events,
         **outcome,
         "subgoals": task.to_json()["subgoals"],
         "actions": actions,

@@ -9,8 +9,10 @@ import numpy as np
 
 from cognitive_arch.domain import Domain, Scene, jittered
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
+from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.world.observation import Observation
+from sim.meddling import disturb
 from sim.pictures import Photographer
 from sim.robot import AimNoise, Robot
 from sim.scenario import FRICTION
@@ -90,6 +92,10 @@ class DrakeEnvironment:
         effect["duration"] = self.world.time - started
         outcome = Outcome.SUCCESS if reason is FailureReason.NONE else Outcome.FAILURE
         return SkillResult(outcome, reason, effect)
+
+    def disturb(self, event: OutsideEvent) -> tuple[str, ...]:
+        """See `Environment.disturb`."""
+        return disturb(self.robot, event)
 
     def settle(self, seconds: float) -> None:
         """See `Environment.settle`."""

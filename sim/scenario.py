@@ -83,9 +83,7 @@ def build_scenario(domain: Domain, scene: Scene, *, friction: float = FRICTION) 
     plant.set_contact_model(ContactModel.kPoint)
     robot = add_robot(plant)
     table = _add_table(plant, scene.table.height, friction)
-    objects = {
-        name: _add_object(plant, name, domain.objects[name], friction) for name in sorted(scene.objects)
-    }
+    objects = {name: _add_object(plant, name, domain.objects[name], friction) for name in scene.things}
     _set_gains(plant)
     # The real arms compensate gravity in their controllers; the objects they carry still weigh.
     plant.set_gravity_enabled(robot, False)

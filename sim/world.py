@@ -17,6 +17,7 @@ from sim.scenario import FRICTION, Scenario, build_scenario
 
 Joints = NDArray[np.float64]
 COMMAND_PERIOD = 0.02  # s between two set points of a motion
+PARK = (2.0, 0.0, -5.0)  # m; where objects wait that are not in the scene: out of sight, far below
 RECORDING_FPS = 5.0  # the viewer interpolates between frames
 
 HOME: Mapping[str, float] = {  # rad; both hands beside the table's work area, well above it
@@ -70,22 +71,39 @@ class World:
     # -- setting up ---------------------------------------------------------------------------------
 
     def reset(self, placements: Mapping[str, Placement]) -> None:
-        """Robot at home, objects just above the table where `placements` says, everything at rest."""
+        """Robot at home, objects just above the table where `placements` says, everything at rest.
+
+        Objects without a placement are parked.
+        """
         plant, context = self.plant, self._plant_context
         self._context.SetTime(0.0)
         positions = np.zeros(plant.num_positions())
         positions[self._positions] = self.home
         plant.SetPositions(context, positions)
         plant.SetVelocities(context, np.zeros(plant.num_velocities()))
-        for name, body in self.scenario.objects.items():
+        for name in self.scenario.objects:
+            if name not in placements:
+                self.park(name)
+                continue
             x, y = placements[name].position
             z = self.scene.table.height + self.height(name) / 2 + 0.0005
-            X_WO = RigidTransform(RollPitchYaw(0, 0, placements[name].yaw), [x, y, z])
-            plant.SetFreeBodyPose(context, body, X_WO)
-            plant.SetFreeBodySpatialVelocity(context, body, SpatialVelocity(np.zeros(6)))
+            self.place(name, RigidTransform(RollPitchYaw(0, 0, placements[name].yaw), [x, y, z]))
         self._send(self.home, np.zeros(len(self.home)))
         self.command = self.home.copy()
         self.simulator.Initialize()
+
+    def place(self, name: str, X_WO: RigidTransform) -> None:
+        """Put an object somewhere, at rest and free to move."""
+        body = self.scenario.objects[name]
+        body.Unlock(self._plant_context)
+        self.plant.SetFreeBodyPose(self._plant_context, body, X_WO)
+        self.plant.SetFreeBodySpatialVelocity(self._plant_context, body, SpatialVelocity(np.zeros(6)))
+
+    def park(self, name: str) -> None:
+        """Take an object out of the scene: far away and locked, so that it does not fall on for ever."""
+        slot = sorted(self.scenario.objects).index(name)
+        self.place(name, RigidTransform([PARK[0], PARK[1] + 0.5 * slot, PARK[2]]))
+        self.scenario.objects[name].Lock(self._plant_context)
 
     # -- looking ------------------------------------------------------------------------------------
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from cognitive_arch.execution.heuristics import (
     action_worked,
     undone,
 )
+from cognitive_arch.outside import Happening, OutsideEvent, Schedule, told
 from cognitive_arch.planning.base import Planner, PlanResult
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
 from cognitive_arch.relational.symbols import Goal, GroundAction, State, satisfied
@@ -94,8 +95,12 @@ class _Progress:
         return self.goals[self.index]
 
 
+SLIPS = (Happening.EMPTY,)
+MEDDLING = tuple(kind for kind in Happening if kind not in SLIPS)
+
+
 class PlanningCycle:
-    """Drives an environment through a list of sub-goals."""
+    """Drives an environment through a list of sub-goals; `outside` is what happens to it meanwhile."""
 
     def __init__(
         self,
@@ -107,6 +112,7 @@ class PlanningCycle:
         *,
         heuristics: Heuristics = Heuristics(),
         settings: CycleSettings = CycleSettings(),
+        outside: Iterable[OutsideEvent] = (),
         on_act: Callable[[GroundAction], None] = lambda action: None,
         on_step: Callable[[Step], None] = lambda step: None,
     ) -> None:
@@ -117,6 +123,7 @@ class PlanningCycle:
         self._rng = rng
         self._heuristics = heuristics
         self._settings = settings
+        self._outside = Schedule(outside)
         self._on_act = on_act
         self._on_step = on_step
         self._grounded: dict[tuple[Entity, ...], tuple[GroundRule, ...]] = {}
@@ -133,7 +140,8 @@ class PlanningCycle:
         self._adaptation = Adaptation(self._settings.decay)
         good = total = 0
         events: list[Event] = []
-        state = self._world.update(observation)
+        self._world.update(observation)
+        state = self._meddle(1, events, tuple(Happening))
         while True:
             plan, end = self._decide(state, events, total)
             if end is EndReason.GOAL_REACHED and not self._lasts(events):
@@ -141,19 +149,23 @@ class PlanningCycle:
                 continue
             if end is not None:
                 state = self._world.state
+                never = (f"{event}: the run was over before" for event in self._outside.pending)
+                events.extend(Event(EventKind.OUTSIDE, why) for why in never)
                 self._record(total + 1, state, events, plan, None, None, state)
                 return self._result(end, good, total, state)
             assert plan is not None
             assert plan.action is not None
             self._on_act(plan.action)
             result = self._environment.execute(plan.action)
+            slips: list[Event] = []
+            result = self._slip(total + 2, plan.action, result, slips)
             after = self._world.update(self._environment.observe())
             worked = self._judge(plan.action, state, after)
             total, good = total + 1, good + worked
             self._record(total, state, events, plan, result, worked, after)
             self._progress.tried.append((plan.action, worked))
-            events = [] if worked else self._adapt(plan.action, state)
-            state = after
+            events = slips + ([] if worked else self._adapt(plan.action, state))
+            state = self._meddle(total + 1, events)
 
     def _lasts(self, events: list[Event]) -> bool:
         """Look again after a while: what holds for a moment only (a stack that topples) is not reached."""
@@ -163,6 +175,33 @@ class PlanningCycle:
         if lost:
             events.append(Event(EventKind.GOAL_LOST, f"{', '.join(lost)} did not last"))
         return not lost
+
+    # -- what others do -----------------------------------------------------------------------------
+
+    def _slip(self, step: int, action: GroundAction, result: SkillResult, events: list[Event]) -> SkillResult:
+        """Let slip what slips before action `step`: at once, so that it counts against the action just done.
+
+        The robot only sees that its hand is empty after all; it cannot tell why.
+        """
+        emptied = self._happen(step, SLIPS, events)
+        if result.outcome is Outcome.SUCCESS and emptied & set(action.args):
+            return replace(result, outcome=Outcome.FAILURE, reason=FailureReason.SLIPPED)
+        return result
+
+    def _meddle(self, step: int, events: list[Event], kinds: Collection[Happening] = MEDDLING) -> WorldState:
+        """Let others meddle before action `step`, and look again if anything changed."""
+        if self._happen(step, kinds, events):
+            return self._world.update(self._environment.observe())
+        return self._world.state
+
+    def _happen(self, step: int, kinds: Collection[Happening], events: list[Event]) -> set[str]:
+        """Outside events of these kinds; returns the hands and objects they changed."""
+        touched: set[str] = set()
+        for event in self._outside.due(step, kinds):
+            changed = self._environment.disturb(event)
+            events.append(Event(EventKind.OUTSIDE, told(event, changed)))
+            touched.update((event.name, *changed) if changed else ())
+        return touched
 
     # -- deciding -----------------------------------------------------------------------------------
 
@@ -302,5 +341,6 @@ class PlanningCycle:
                 self._ground(state),
                 progress.tried,
                 progress.horizon,
+                absent_entities(progress.goal, [entity.name for entity in state.entities]),
             )
         return EpisodeResult(report is None, end, good, total, report, state)

@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.world.observation import Observation
 
@@ -33,6 +34,8 @@ class FailureReason(StrEnum):
     OUT_OF_REACH = "out_of_reach"  # no arm posture reaches the place
     NOT_GRASPED = "not_grasped"  # the fingers closed, the object did not come along
     SLIPPED = "slipped"  # it was held and got lost on the way
+    NOT_A_TOOL = "not_a_tool"  # what the hand holds is no tool
+    CANNOT_PULL = "cannot_pull"  # the tool has nothing to get behind an object with
     MISPLACED = "misplaced"  # it was released and does not rest where it should
     NO_EFFECT = "no_effect"  # carried out, nothing observable changed
     UNEXPECTED_EFFECT = "unexpected_effect"  # something changed, but not what the rule's first outcome says
@@ -72,6 +75,15 @@ class Environment(Protocol):
 
     def execute(self, action: GroundAction) -> SkillResult:
         """Attempt `action`. An impossible one returns a failure with its reason, it never raises."""
+        ...
+
+    def disturb(self, event: OutsideEvent) -> tuple[str, ...]:
+        """Let something happen that the robot does not do; its `step` does not matter here.
+
+        Returns the objects it changed, none if there was nothing to change. Where a place is taken, a
+        free one nearby is used. An object to be added must be one of the scene's `things`, for a
+        simulator builds its world beforehand.
+        """
         ...
 
     def settle(self, seconds: float) -> None:

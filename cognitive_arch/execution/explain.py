@@ -36,16 +36,20 @@ class Attempts:
 
 @dataclass(frozen=True, slots=True)
 class FailureReport:
-    """Which sub-goal was not reached, what was tried for it, what stands in the way."""
+    """Which sub-goal was not reached, what was tried for it, what stands in the way, what is not there."""
 
     reason: EndReason
     subgoal: int
     attempts: tuple[Attempts, ...]
     diagnosis: Diagnosis
+    absent: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         tried = ", ".join(map(str, self.attempts)) or "nothing, for nothing promised to help"
-        parts = [f"sub-goal {self.subgoal} was not reached ({self.reason})", f"tried: {tried}"]
+        parts = [f"sub-goal {self.subgoal} was not reached ({self.reason})"]
+        if self.absent:
+            parts.append(f"it takes {' and '.join(self.absent)}, which I do not see any more")
+        parts.append(f"tried: {tried}")
         if self.diagnosis.verdict is not Verdict.HOLDS:
             parts += [f"missing: {self._missing(literal)}" for literal in self.diagnosis.literals]
         return "; ".join(parts)
@@ -61,6 +65,7 @@ class FailureReport:
         return {
             "reason": str(self.reason),
             "subgoal": self.subgoal,
+            "absent": list(self.absent),
             "tried": [{"action": a.action, "tried": a.tried, "worked": a.worked} for a in self.attempts],
             **self.diagnosis.to_json(),
         }
@@ -74,12 +79,16 @@ def explain_failure(
     rules: Sequence[GroundRule],
     tried: Sequence[tuple[GroundAction, bool]],
     horizon: int,
+    absent: tuple[str, ...] = (),
 ) -> FailureReport:
-    """Report on `goal` (number `subgoal`, from 1) in `state`; `tried` are the attempts made for it."""
+    """Report on `goal` (number `subgoal`, from 1) in `state`; `tried` are the attempts made for it.
+
+    `absent` are objects that the goal needs and that are not there.
+    """
     count: Counter[GroundAction] = Counter(action for action, _ in tried)
     worked: Counter[GroundAction] = Counter(action for action, ok in tried if ok)
     attempts = tuple(Attempts(str(a), n, worked[a]) for a, n in sorted(count.items()))
-    return FailureReport(reason, subgoal, attempts, diagnose(state, goal, rules, horizon))
+    return FailureReport(reason, subgoal, attempts, diagnose(state, goal, rules, horizon), absent)
 
 
 def absent_entities(goal: Goal, known: Sequence[str]) -> tuple[str, ...]:

@@ -46,6 +46,7 @@ class EventKind(StrEnum):
     CREATIVITY = "creativity"
     OTHER_HAND = "other_hand"
     GOAL_LOST = "goal_lost"
+    OUTSIDE = "outside"
 
 
 @dataclass(frozen=True, slots=True)

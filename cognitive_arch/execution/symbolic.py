@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -16,6 +17,8 @@ import numpy as np
 from cognitive_arch.domain import Domain, Placement, Scene, jittered
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
 from cognitive_arch.execution.noise import NoiseLevels
+from cognitive_arch.execution.placing import Place, footprint, nearest_free
+from cognitive_arch.outside import Happening, OutsideEvent
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
 from cognitive_arch.relational.symbols import GroundAction, Literal, State
 from cognitive_arch.relational.transition import covering_rule
@@ -71,16 +74,21 @@ class SymbolicEnvironment:
         self._things = {name: _Thing(p.position, p.yaw) for name, p in sorted(placements.items())}
         self._properties = frozenset()
         self._steps = 0
-        entities = [Entity(hand, "hand") for hand in HANDS]
-        entities += [Entity(name, self.domain.objects[name].kind) for name in self._things]
-        self._ground = self.rules.ground(entities)
+        self._reground()
         return self.observe()
+
+    def _reground(self) -> None:
+        """The rules over what is there now."""
+        entities = [Entity(hand, "hand") for hand in HANDS]
+        entities += [Entity(name, self.domain.objects[name].kind) for name in sorted(self._things)]
+        self._ground = self.rules.ground(entities)
 
     def observe(self) -> Observation:
         """See `Environment.observe`."""
         objects = tuple(self._see(name) for name in sorted(self._things))
         hands = tuple(HandObservation(hand, self._held_by(hand)) for hand in HANDS)
-        return Observation(float(self._steps), objects, hands, (), tuple(sorted(self._properties)))
+        absent = tuple(name for name in self.scene.things if name not in self._things)
+        return Observation(float(self._steps), objects, hands, absent, tuple(sorted(self._properties)))
 
     def execute(self, action: GroundAction) -> SkillResult:
         """See `Environment.execute`."""
@@ -98,6 +106,61 @@ class SymbolicEnvironment:
         after = self._xy(action.args[0])
         effect = {"displacement_x": after[0] - before[0], "displacement_y": after[1] - before[1]}
         return SkillResult(Outcome.SUCCESS, FailureReason.NONE, effect)
+
+    def disturb(self, event: OutsideEvent) -> tuple[str, ...]:
+        """See `Environment.disturb`."""
+        changed = self._touched(event)
+        if event.kind in (Happening.EMPTY, Happening.TOPPLE):
+            x_y = {name: self._xy(name) for name in changed}
+            for n, name in enumerate(changed):
+                place = self._free_spot(name, x_y[name], ignoring=changed[n:])
+                self._things[name] = replace(self._things[name], place=place, support=None, hand=None)
+        elif changed:
+            self._take_out(event.name)
+            if event.position is not None:
+                place = self._free_spot(event.name, event.position)
+                self._things[event.name] = _Thing(place)
+            self._reground()
+        return changed
+
+    def _touched(self, event: OutsideEvent) -> tuple[str, ...]:
+        """The objects that an event changes, from the bottom up."""
+        name, there = event.name, event.name in self._things
+        if event.kind is Happening.EMPTY:
+            held = self._held_by(name)
+            return (held,) if held else ()
+        if event.kind is Happening.ADD:
+            known = name in self.domain.objects and not there
+            return (name,) if known else ()
+        if event.kind is Happening.TOPPLE and there:
+            above = self._above(name)
+            return (name, *above) if self._things[name].support else tuple(above)
+        return (name,) if there else ()
+
+    def _above(self, name: str) -> list[str]:
+        """What lies on `name`, and on that, from the bottom up."""
+        above = [n for n in self._things if n != name and name in self._below(n)]
+        return sorted(above, key=self._bottom)
+
+    def _take_out(self, name: str) -> None:
+        """Remove an object; what lies on it sinks to what it lay on."""
+        taken = self._things.pop(name, None)
+        if taken is None:
+            return
+        for other, thing in list(self._things.items()):
+            if thing.support == name:
+                self._things[other] = replace(thing, place=taken.place, support=taken.support)
+
+    def _free_spot(self, name: str, wanted: Place, ignoring: Sequence[str] = ()) -> Place:
+        """The free place on the table nearest to `wanted`."""
+        others = [
+            (self._xy(other)[0] + x, self._xy(other)[1] + y)
+            for other, thing in self._things.items()
+            if other != name and other not in ignoring and thing.hand is None
+            for x, y in footprint(self.domain.objects[other].shape, thing.yaw)
+        ]
+        yaw = self._things[name].yaw if name in self._things else 0.0
+        return nearest_free(wanted, others, footprint(self.domain.objects[name].shape, yaw))
 
     def settle(self, seconds: float) -> None:
         """Nothing moves by itself here."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Any
 
@@ -12,6 +13,7 @@ from cognitive_arch.errors import BackendError
 from cognitive_arch.execution.backends import BACKENDS, make_environment
 from cognitive_arch.execution.environment import Environment, FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
+from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.world.anchoring import WorldModel
 from tests.conftest import action
@@ -19,10 +21,11 @@ from tests.conftest import action
 DRAKE = pytest.param("drake", marks=pytest.mark.physics)
 
 
-def build(backend: str, **options: Any) -> Environment:
+def build(backend: str, *events: str, **options: Any) -> Environment:
     domain: Domain = load_domain("sandwich")
+    scene = load_scene("simple").with_events(tuple(map(OutsideEvent.parse, events)), domain)
     options.setdefault("noise", NoiseLevels())
-    return make_environment(backend, domain, load_scene("simple"), load_rules(domain.rules_path), **options)
+    return make_environment(backend, domain, scene, load_rules(domain.rules_path), **options)
 
 
 @pytest.fixture(params=["symbolic", DRAKE])
@@ -122,3 +125,93 @@ def test_reset_forgets_the_last_episode(environment: Environment) -> None:
     first = environment.reset(1)
     environment.execute(action("graspWith(Ham,LeftHand)"))
     assert environment.reset(1) == first
+
+
+# -- outside events ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(params=["symbolic", DRAKE])
+def stage(request: pytest.FixtureRequest) -> Iterator[Environment]:
+    """A world in which cheese may appear."""
+    env = build(request.param, "1:add:Cheese:-0.30,0.20")
+    env.reset(0)
+    yield env
+    env.close()
+
+
+def happen(environment: Environment, event: str) -> tuple[str, ...]:
+    return environment.disturb(OutsideEvent.parse(f"1:{event}"))
+
+
+def seen(environment: Environment) -> dict[str, tuple[float, ...]]:
+    return {obj.name: obj.position for obj in environment.observe().objects}
+
+
+def work(environment: Environment, *calls: str) -> None:
+    for call in calls:
+        assert environment.execute(action(call)).outcome is Outcome.SUCCESS, call
+
+
+def test_what_is_added_can_be_used_and_what_is_removed_is_gone(stage: Environment) -> None:
+    assert "Cheese" not in seen(stage)
+    assert happen(stage, "add:Cheese:-0.30,0.20") == ("Cheese",)
+    assert seen(stage)["Cheese"][:2] == pytest.approx((-0.30, 0.20), abs=0.005)
+    assert "reachableWith(Cheese,RightHand)" in atoms(stage)
+    work(stage, "graspWith(Cheese,RightHand)", "putOnWith(Cheese,Bun-bottom,RightHand)")
+    world = WorldModel()
+    world.update(stage.observe())
+    assert happen(stage, "remove:Cheese") == ("Cheese",)
+    assert world.update(stage.observe()).object("Cheese") is None
+    assert stage.execute(action("graspWith(Cheese,RightHand)")).reason is FailureReason.UNKNOWN_OBJECT
+    assert happen(stage, "remove:Cheese") == ()
+    work(stage, "graspWith(Ham,LeftHand)")
+    assert "Cheese" in stage.reset(0).absent
+
+
+def test_a_layer_that_is_moved_lets_the_ones_above_sink(environment: Environment) -> None:
+    work(environment, "graspWith(Ham,LeftHand)", "putOnWith(Ham,Bun-bottom,LeftHand)")
+    work(environment, "graspWith(Bun-top,LeftHand)", "putOnWith(Bun-top,Ham,LeftHand)")
+    assert happen(environment, "move:Ham:-0.35,0.15") == ("Ham",)
+    assert seen(environment)["Ham"][:2] == pytest.approx((-0.35, 0.15), abs=0.005)
+    assert {a for a in atoms(environment) if a.startswith("on(")} == {"on(Bun-top,Bun-bottom)"}
+
+
+def test_what_topples_lies_on_the_table_with_all_that_was_on_it(environment: Environment) -> None:
+    assert happen(environment, "topple:Ham") == ()
+    work(environment, "graspWith(Ham,LeftHand)", "putOnWith(Ham,Bun-bottom,LeftHand)")
+    work(environment, "graspWith(Bun-top,LeftHand)", "putOnWith(Bun-top,Ham,LeftHand)")
+    assert happen(environment, "topple:Ham") == ("Ham", "Bun-top")
+    assert not [a for a in atoms(environment) if a.startswith("on(")]
+    work(environment, "graspWith(Ham,LeftHand)", "putOnWith(Ham,Bun-bottom,LeftHand)")
+
+
+def test_what_slips_lies_on_the_table_and_the_hand_is_free(environment: Environment) -> None:
+    assert happen(environment, "empty:LeftHand") == ()
+    work(environment, "graspWith(Ham,LeftHand)")
+    assert happen(environment, "empty:LeftHand") == ("Ham",)
+    now = atoms(environment)
+    assert {"isClear(LeftHand)", "reachableWith(Ham,LeftHand)"} <= now
+    assert "inHand(Ham,LeftHand)" not in now
+    assert seen(environment)["Ham"][2] == pytest.approx(seen(environment)["Bun-bottom"][2] - 0.005, abs=0.003)
+    work(environment, "graspWith(Ham,LeftHand)")
+
+
+def test_a_held_thing_can_be_taken_from_the_hand(environment: Environment) -> None:
+    work(environment, "graspWith(Ham,LeftHand)")
+    assert happen(environment, "move:Ham:-0.35,0.15") == ("Ham",)
+    assert "isClear(LeftHand)" in atoms(environment)
+    work(environment, "graspWith(Bun-top,LeftHand)", "graspWith(Ham,RightHand)")
+
+
+def test_a_place_that_is_taken_is_not_used_twice(environment: Environment) -> None:
+    assert happen(environment, "move:Ham:-0.289,0.011") == ("Ham",)
+    places = seen(environment)
+    assert math.dist(places["Ham"][:2], places["Bun-bottom"][:2]) > 0.07
+    assert not [a for a in atoms(environment) if a.startswith("on(")]
+
+
+def test_things_nobody_knows_of_cannot_be_disturbed(environment: Environment) -> None:
+    before = environment.observe()
+    for event in ("remove:Unicorn", "move:Cheese:-0.3,0.1", "add:Unicorn:-0.3,0.1", "topple:Cheese"):
+        assert happen(environment, event) == ()
+    assert environment.observe() == before
