@@ -39,6 +39,7 @@ StoreOption = Annotated[
 PlannerOption = Annotated[
     str, typer.Option(help="guided-prada, a-prada, prada, uct, sst, or one that another package adds.")
 ]
+SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
 RecordOption = Annotated[
     bool, typer.Option("--record/--no-record", help="Keep a Meshcat recording and pictures (drake).")
 ]
@@ -91,7 +92,7 @@ def run(
         str, typer.Option(help="all, none, or a list of adaptability,creativity,goal_maintenance.")
     ] = "all",
     planner: PlannerOption = "guided-prada",
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: SeedOption = 0,
     jitter: Annotated[
         float, typer.Option(help="Move the objects by up to this many metres, and turn them, at the start.")
     ] = 0.0,
@@ -128,6 +129,35 @@ def run(
 
 
 @app.command()
+def demo(
+    name: Annotated[str | None, typer.Argument(help="Which demo; without it they are listed.")] = None,
+    backend: Annotated[
+        str | None, typer.Option(help="drake or symbolic, in place of the demo's own.")
+    ] = None,
+    seed: SeedOption = 0,
+    store: StoreOption = Path("runs"),
+    record: RecordOption = True,
+    as_json: Json = False,
+) -> None:
+    """Run a named scenario: a tool for what is out of reach, sabotage, a slip, a thing that disappears."""
+    from cognitive_arch import report
+    from cognitive_arch.demos import load_demos
+    from cognitive_arch.session import run_task
+
+    demos = load_demos()
+    if name is None:
+        return _print(demos.to_json(), str(demos), as_json)
+    chosen = demos.find(name)
+    config = chosen.config(backend, seed, record)
+    _print({}, "" if as_json else report.demo_text(chosen, config), False)
+    with report.LiveProgress(quiet=as_json) as live:
+        result = run_task(chosen.sentence, config, store, live.progress)
+    _print({"demo": name} | result, report.result_text(result), as_json)
+    if not result["success"]:
+        raise typer.Exit(1)
+
+
+@app.command()
 def plan(
     sentence: Annotated[
         str | None, typer.Argument(help='What to plan for, for example "make a ham sandwich".')
@@ -147,7 +177,7 @@ def plan(
     planner: PlannerOption = "guided-prada",
     horizon: Annotated[int, typer.Option(help="How many actions a plan may have.")] = 5,
     samples: Annotated[int | None, typer.Option(help="Sequences (or episodes) to sample.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of everything random.")] = 0,
+    seed: SeedOption = 0,
     repeat: Annotated[int, typer.Option(help="Plan so often; the time told is the median.")] = 1,
     evaluate: Annotated[
         bool, typer.Option("--evaluate", help="Say how likely the plan is to reach the goal by the rules.")

@@ -161,7 +161,7 @@ class ReachLimits(_Frozen):
     side: Annotated[float, Field(ge=0)] = 0.15
 
 
-def _event(value: object) -> OutsideEvent:
+def event_from_text(value: object) -> OutsideEvent:
     """An event of a scene file: the text that the command line takes, too."""
     if isinstance(value, OutsideEvent):
         return value
@@ -182,7 +182,7 @@ class Scene(_Frozen):
     table: Table = Table()
     reach: ReachLimits = ReachLimits()
     objects: dict[Name, Placement] = Field(min_length=1)
-    events: tuple[Annotated[OutsideEvent, BeforeValidator(_event)], ...] = Field((), max_length=100)
+    events: tuple[Annotated[OutsideEvent, BeforeValidator(event_from_text)], ...] = Field((), max_length=100)
 
     @property
     def things(self) -> tuple[str, ...]:
@@ -215,7 +215,8 @@ def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str,
     raise ConfigError(f"objects of scene {scene.name} cannot be moved by {amount:g} m without overlap")
 
 
-def _read_yaml(path: Path, what: str) -> Any:
+def read_yaml(path: Path, what: str) -> Any:
+    """The mapping in a YAML file; raises `ConfigError` naming file and line."""
     text = resources.read_text(path, f"{what} file", ConfigError)
     try:
         data = yaml.safe_load(text)
@@ -229,7 +230,8 @@ def _read_yaml(path: Path, what: str) -> Any:
     return data
 
 
-def _explain(error: ValidationError, path: Path, model: type[BaseModel]) -> ConfigError:
+def explain_invalid(error: ValidationError, path: Path, model: type[BaseModel]) -> ConfigError:
+    """One line for a file that does not fit its model: the field, what is wrong, and the fields there are."""
     first = error.errors(include_url=False)[0]
     place = ".".join(str(part) for part in first["loc"]) or "(top level)"
     more = error.error_count() - 1
@@ -249,9 +251,9 @@ def load_domain(name: str) -> Domain:
         raise ConfigError(unknown("domain", name, domain_names()))
     path = resources.domains_dir() / name / "domain.yaml"
     try:
-        return Domain.model_validate(_read_yaml(path, "domain"))
+        return Domain.model_validate(read_yaml(path, "domain"))
     except ValidationError as error:
-        raise _explain(error, path, Domain) from None
+        raise explain_invalid(error, path, Domain) from None
 
 
 def scene_paths() -> dict[str, Path]:
@@ -274,9 +276,9 @@ def load_scene(name_or_path: str) -> Scene:
     else:
         raise ConfigError(unknown("scene", name_or_path, known) + ", or the path of a .yaml file")
     try:
-        scene = Scene.model_validate(_read_yaml(path, "scene"))
+        scene = Scene.model_validate(read_yaml(path, "scene"))
     except ValidationError as error:
-        raise _explain(error, path, Scene) from None
+        raise explain_invalid(error, path, Scene) from None
     domain = load_domain(scene.domain)
     for name in scene.objects:
         if name not in domain.objects:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import textwrap
 from collections.abc import Sequence
 from types import TracebackType
 from typing import Any
@@ -11,10 +12,11 @@ from typing import Any
 from rich.console import Console
 from rich.markup import escape
 
+from cognitive_arch.demos import Demo
 from cognitive_arch.execution.cycle import Step
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.records import step_record
-from cognitive_arch.session import Progress, Task
+from cognitive_arch.session import Progress, RunConfig, Task
 
 
 def task_text(task: Task) -> str:
@@ -23,6 +25,12 @@ def task_text(task: Task) -> str:
     lines.append("means        " + ", ".join(map(str, task.semantic)))
     lines.extend(f"sub-goal {n}   {_joined(goal)}" for n, goal in enumerate(task.goals, 1))
     return "\n".join(lines)
+
+
+def demo_text(demo: Demo, config: RunConfig) -> str:
+    """What a demo shows, and how to run it with other settings."""
+    look = textwrap.fill(demo.look, 100, initial_indent="look at      ", subsequent_indent=" " * 13)
+    return f"demo         {demo.title}\n{look}\nthe same as  {demo.command(config)}"
 
 
 def step_text(record: dict[str, Any]) -> str:
