@@ -21,6 +21,7 @@ Vector = NDArray[np.float64]
 TORSO_COST, ARM_COST = 2.0, 0.3  # moving the torso moves everything, so arms go first
 POSITION_TOLERANCE = 0.001  # m
 HAND_CLEARANCE = 0.06  # m that both wrists keep above the table
+MAX_LEAN = 0.40  # rad that the torso may lean forward; farther, and the head hangs over the table
 RESTARTS = 3
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -65,6 +66,8 @@ class Kinematics:
         self.plant = MultibodyPlant(0.0)
         add_robot(self.plant)
         self.plant.Finalize()
+        lean = self.plant.GetJointByName("torso_pitch")
+        lean.set_position_limits(lean.position_lower_limits(), np.array([MAX_LEAN]))
         self._context = self.plant.CreateDefaultContext()
         self._index = np.array([self.plant.GetJointByName(name).position_start() for name in joint_names])
         self._names = tuple(joint_names)
@@ -100,8 +103,9 @@ class Kinematics:
         Restarts draw from a generator of their own, seeded by the attempt, so that the answer depends on
         the arguments only.
         """
-        start = self._full(near)
         lower, upper = self.plant.GetPositionLowerLimits(), self.plant.GetPositionUpperLimits()
+        # Fingers that press are commanded beyond their limit.
+        start = np.clip(self._full(near), lower, upper)
         for attempt in range(restarts):
             problem = self._problem(hand, target, idle, start)
             guess = start

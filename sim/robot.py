@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -18,6 +18,7 @@ APPROACH = 0.09  # m above its target that a hand comes down from
 LEVEL, TILTS = 0.03, (0.05, 0.15, 0.30)  # rad
 YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing direction
 CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may be moved meanwhile
+TOOL_TILT, TOOL_TURN = 0.06, 0.15  # rad, the same for a hand with a tool
 TRANSIT_SPEED = 0.9  # rad/s of the fastest joint between poses
 
 
@@ -93,14 +94,18 @@ class Robot:
         return None if path is None else (start, path)
 
     def rest(self, hand: str) -> Joints:
-        """The home posture for torso and `hand`, the other arm home or carrying, fingers as commanded.
+        """The home posture for torso and `hand`; the other arm, and with it the torso, home or carrying;
+        fingers as commanded.
 
         Inverse kinematics starts from here, so that postures do not wander off over many actions.
         """
         other = _other(hand)
-        joints = np.where(self._arm_joints(hand, "torso"), self.world.home, self.world.command)
-        if other in self.grips:
-            joints = np.where(self._arm_joints(other), self.grips[other].carrying, joints)
+        if other not in self.grips:
+            return np.where(self._arm_joints(hand, "torso"), self.world.home, self.world.command)
+        # The torso goes back to where the other arm's posture was solved for: with any other lean the
+        # same arm joints may lower a tool onto the table.
+        joints = np.where(self._arm_joints(hand), self.world.home, self.world.command)
+        joints = np.where(self._arm_joints(other, "torso"), self.grips[other].carrying, joints)
         return joints
 
     def _arm_joints(self, hand: str, *more: str) -> list[bool]:
@@ -115,7 +120,14 @@ class Robot:
         X_WH = self.kinematics.hand_pose(other, self.grips[other].carrying)
         up_W = np.array([0.0, 0.0, 1.0])
         up_H = X_WH.rotation().inverse() @ up_W
-        return HandTarget(np.zeros(3), X_WH.translation(), up_H, up_W, CARRY_TILT, tolerance=CARRY_TOLERANCE)
+        p_WH = X_WH.translation()
+        target = HandTarget(np.zeros(3), p_WH, up_H, up_W, CARRY_TILT, tolerance=CARRY_TOLERANCE)
+        name = self.perception.held(other)
+        if name is None or self.domain.objects[name].kind != "tool":
+            return target
+        # A tool sticks out far: it must not swing to where the working hand is.
+        fingers_W = X_WH.rotation().matrix()[:, 1]
+        return replace(target, tilt=TOOL_TILT, fingers_W=fingers_W, yaw_tolerance=TOOL_TURN)
 
     def go_home(self, hand: str) -> None:
         """Back to the home posture with one arm, fingers as they are."""

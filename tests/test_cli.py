@@ -165,7 +165,6 @@ BAD = [
     (["run", SANDWICH, "--rules", "/dev/zero"], "is not a file"),
     (["run", SANDWICH, "--scene", "/dev/zero"], "is not a file"),
     (["run", SANDWICH, "--scene", "/"], "is not a file"),
-    (["run", "pull the ham closer", "--scene", "complex", "--no-record"], "no skill for pull"),
     (["parse", "hand grasp Ham, LeftHand grasp Bun-top"], "Ham in LeftHand"),
     (["run", SANDWICH, "--frobnicate"], "--frobnicate"),
     (["run"], "sentence"),

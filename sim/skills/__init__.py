@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from sim.skills.base import Skill
 from sim.skills.drop import drop
 from sim.skills.grasp import grasp
+from sim.skills.pull import pull
 from sim.skills.put import put_on
 
 
@@ -22,4 +23,5 @@ SKILLS = {
     "graspWith": SkillEntry(grasp, 1),
     "putOnWith": SkillEntry(put_on, 2),
     "dropWith": SkillEntry(drop, 1),
+    "pull": SkillEntry(pull, 2),
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
 import numpy as np
@@ -9,14 +10,17 @@ import numpy as np
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
 from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, STROKE
-from sim.kinematics import HandTarget, Vector
+from sim.kinematics import DOWN, HandTarget, Vector, palm_axis
 from sim.robot import YAWS, Grip, Robot
 from sim.skills.base import release
+from sim.skills.tool import carry_tool
 from sim.world import Joints
 
 TIP_HEIGHT = 0.003  # m of the finger tips above the object's underside
 MARGIN = 0.015  # m between each open finger and the object
 SQUEEZE = 0.010  # m that the closing fingers are commanded into the object
+FIRM_SQUEEZE = 0.025  # m into a tool: enough for all the force the fingers have
+HANDLE = (0.030, 0.050, 0.080, 0.110)  # m from the handle's end at which a tool may be held, best first
 CARRY = {"LeftHand": (-0.24, -0.17), "RightHand": (-0.24, 0.17)}  # m, where a full hand waits
 CARRY_HEIGHT = 0.17  # m above the table
 
@@ -29,7 +33,10 @@ def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         return obstacle
     aim = robot.noise.draw(hand, robot.rng)
     width, yaws = grip_choices(robot, name)
-    grip = Grip(min(STROKE, width / 2 + MARGIN), max(0.0, width / 2 - SQUEEZE), yaws, robot.world.home)
+    # A tool is a lever that wants to turn in the hand: the fingers press on it as hard as they can.
+    squeeze = FIRM_SQUEEZE if robot.domain.objects[name].shape.type == "tool" else SQUEEZE
+    closed = width / 2 - squeeze if squeeze > SQUEEZE else max(0.0, width / 2 - squeeze)
+    grip = Grip(min(STROKE, width / 2 + MARGIN), closed, yaws, robot.world.home)
     plan = _plan(robot, name, hand, grip, aim)
     if plan is None:
         return FailureReason.OUT_OF_REACH
@@ -47,7 +54,10 @@ def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         robot.go_home(hand)
         return FailureReason.NOT_GRASPED
     robot.grips[hand] = grip
-    carry(robot, hand)
+    if robot.domain.objects[name].shape.type == "tool":
+        carry_tool(robot, hand, name)
+    else:
+        carry(robot, hand)
     return FailureReason.NONE if robot.perception.held(hand) == name else FailureReason.SLIPPED
 
 
@@ -80,10 +90,7 @@ def _wrap(angle: float) -> float:
 
 
 def _plan(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> tuple[Joints, list[Joints]] | None:
-    p_WO = robot.world.pose(name).translation() + aim
-    bottom = p_WO[2] - robot.world.height(name) / 2
-    tips = np.array([p_WO[0], p_WO[1], bottom + TIP_HEIGHT])
-    targets = robot.grasp_targets(hand, tips, grip.yaws)
+    targets = _targets(robot, name, hand, grip, aim)
     # Sorting is stable: among equally free directions the more upright and straighter ones stay first.
     targets.sort(key=lambda target: -min(0.0, _clearance(robot, name, target, grip)))
     for target in targets:
@@ -93,6 +100,27 @@ def _plan(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> tuple[
         if found is not None:
             return found
     return None
+
+
+def _targets(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> list[HandTarget]:
+    """Where the finger tips could go: around an object's middle, or on a tool's handle."""
+    shape, X_WO = robot.domain.objects[name].shape, robot.world.pose(name)
+    up = np.array([0.0, 0.0, TIP_HEIGHT - robot.world.height(name) / 2])
+    if shape.type != "tool":
+        return robot.grasp_targets(hand, X_WO.translation() + aim + up, grip.yaws)
+    targets = []
+    ends = (1.0,) if shape.bar > 0 else (1.0, -1.0)
+    for inset, end in itertools.product(HANDLE, ends):
+        handle = X_WO @ np.array([end * (shape.length / 2 - inset), 0.0, 0.0])
+        along = end * X_WO.rotation().matrix()[:, 0]
+        # The stretched fingers point to the tool's head: held the other way round it is of no use.
+        targets += [
+            target
+            for target in robot.grasp_targets(hand, handle + aim + up, grip.yaws)
+            if target.fingers_W is not None
+            and float(np.cross(palm_axis(hand)[2] * DOWN, along) @ target.fingers_W) < 0
+        ]
+    return targets
 
 
 def _clearance(robot: Robot, name: str, target: HandTarget, grip: Grip) -> float:

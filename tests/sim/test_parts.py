@@ -111,8 +111,8 @@ def test_reach_is_kinematic(kinematics: Kinematics) -> None:
         assert kinematics.reaches(hand, -0.483, -0.068)
         assert not kinematics.reaches(hand, -0.72, 0.0)
     # Each arm reaches farther on its own side (left is y < 0).
-    assert kinematics.reaches("LeftHand", -0.50, -0.25)
-    assert not kinematics.reaches("RightHand", -0.50, -0.30)
+    assert kinematics.reaches("LeftHand", -0.48, -0.22)
+    assert not kinematics.reaches("RightHand", -0.48, -0.22)
 
 
 def test_aim_noise() -> None:

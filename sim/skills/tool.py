@@ -1,0 +1,269 @@
+"""A tool in the hand, and sweeping it over the table: what `pull` and `push` share."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from cognitive_arch.domain import ToolShape
+from cognitive_arch.execution.environment import FailureReason
+from cognitive_arch.world.observation import HANDS
+from sim.footprint import Capsule, Point, disc, footprint, smallest_gap
+from sim.hands import FINGER_WIDTH, STROKE
+from sim.kinematics import HandTarget, Vector
+from sim.robot import Robot
+from sim.skills.base import release
+from sim.world import Joints
+
+FLOAT = 0.002  # m between a sweeping tool and the table
+LIFT = 0.075  # m above that at which a tool travels: over everything but a tall stack
+SPEED = 0.10  # m/s of a sweep
+MARGIN = 0.008  # m that a sweep keeps from what it is not to touch
+OVER = 0.008  # m that a raised shaft passes over it
+LEVEL = 0.03  # rad; at the far end of a shaft this is 6 mm
+YAW_TOLERANCE = 0.03  # rad
+PITCHES = (0.0, 0.08, 0.15)  # rad by which the handle may be higher than the head
+PALM_HEIGHT = 0.045  # m above the table: what is taller must not be under the palm
+_SHAFT_PARTS = 6
+_PIECE = 0.03  # m between two waypoints, or two looks at what is in the way
+
+
+@dataclass(frozen=True)
+class HeldTool:
+    """A tool in a hand. Its frame T has its origin mid-shaft and x from the head to the handle."""
+
+    hand: str
+    name: str
+    shape: ToolShape
+    X_HT: RigidTransform
+
+    @property
+    def p_TH(self) -> Vector:
+        """The middle of the head (bar or tip), metres."""
+        return np.array([-self.shape.length / 2 + self.shape.width / 2, 0.0, 0.0])
+
+    @property
+    def grip(self) -> float:
+        """From the middle of the head to the fingers along the shaft, metres."""
+        fingers = self.X_HT.inverse() @ np.array([0.02, 0.0, 0.0])
+        return float(fingers[0] - self.p_TH[0])
+
+    def target(self, head: Vector, yaw: float, pitch: float = 0.0) -> HandTarget:
+        """The hand pose that brings the head to `head` (metres), the shaft at `yaw` and `pitch`."""
+        R_WT = RollPitchYaw(0.0, -pitch, yaw).ToRotationMatrix()
+        R_TH = self.X_HT.rotation().inverse()
+        up_H = R_TH.inverse() @ np.array([0.0, 0.0, 1.0])
+        fingers_W = R_WT @ (R_TH @ np.array([0.0, 1.0, 0.0]))
+        return HandTarget(
+            self.X_HT @ self.p_TH,
+            head,
+            up_H,
+            R_WT @ np.array([0.0, 0.0, 1.0]),
+            LEVEL,
+            fingers_W,
+            YAW_TOLERANCE,
+        )
+
+    def covers(self, head: Point, yaw: float, pitch: float) -> list[tuple[Capsule, float]]:
+        """What tool and finger tips cover of the table with the head there, each with the height of its
+        underside above the table (metres): a pitched shaft passes over what is low."""
+        cos, sin, rise = math.cos(yaw), math.sin(yaw), math.sin(pitch)
+        half = self.shape.width / 2
+
+        def at(along: float, across: float = 0.0) -> Point:
+            return (head[0] + along * cos - across * sin, head[1] + along * sin + across * cos)
+
+        side = max(0.0, self.shape.bar / 2 - half)
+        parts = [(Capsule(at(0.0, -side), at(0.0, side), half), FLOAT)]
+        ends = np.linspace(0.0, self.shape.length - self.shape.width, _SHAFT_PARTS + 1)
+        for near, far in itertools.pairwise(float(end) for end in ends):
+            parts.append((Capsule(at(near), at(far), half), FLOAT + near * rise))
+        parts.append((disc(at(self.grip), FINGER_WIDTH), FLOAT + self.grip * rise - 0.008))
+        return parts
+
+    def palm(self, head: Point, yaw: float) -> Capsule:
+        """What is below the palm and the stretched fingers."""
+        cos, sin = math.cos(yaw), math.sin(yaw)
+        front, back = self.grip - 0.08, self.grip + 0.10
+        ends = [(head[0] + along * cos, head[1] + along * sin) for along in (front, back)]
+        return Capsule(ends[0], ends[1], 0.045)
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The head goes from `start` to `end` (metres) on the table, the shaft at `yaw` and the handle
+    raised by `pitch` (radians)."""
+
+    yaw: float
+    start: Point
+    end: Point
+    pitch: float = 0.0
+
+    @property
+    def length(self) -> float:
+        return math.dist(self.start, self.end)
+
+    def heads(self) -> Iterator[Point]:
+        """Places along the way, both ends included."""
+        n = max(1, math.ceil(self.length / _PIECE))
+        for i in range(n + 1):
+            yield (
+                self.start[0] + (self.end[0] - self.start[0]) * i / n,
+                self.start[1] + (self.end[1] - self.start[1]) * i / n,
+            )
+
+
+@dataclass(frozen=True)
+class Motion:
+    """Joints above the start of a sweep and the waypoints down, along and up again."""
+
+    above: Joints
+    down: list[Joints]
+    along: list[Joints]
+    up: list[Joints]
+    seconds: float
+
+
+def held_tool(robot: Robot, name: str, hand: str) -> HeldTool | None:
+    """The tool in the hand; None if the hand does not hold it, or `name` is no tool."""
+    shape = robot.domain.objects[name].shape
+    if not isinstance(shape, ToolShape) or robot.perception.held(hand) != name:
+        return None
+    X_HT = robot.world.hand_pose(hand).inverse() @ robot.world.pose(name)
+    if shape.bar <= 0 and X_HT.inverse().translation()[0] < 0:
+        X_HT = X_HT @ RigidTransform(RollPitchYaw(0.0, 0.0, math.pi), np.zeros(3))
+    return HeldTool(hand, name, shape, X_HT)
+
+
+def unusable(robot: Robot, obj: str, tool: str, hand: str) -> FailureReason | None:
+    """Why the tool in the hand cannot be used on the object, if so."""
+    if robot.perception.held(hand) != tool:
+        return FailureReason.HAND_EMPTY
+    if obj in {robot.perception.held(h) for h in HANDS}:
+        return FailureReason.HAND_BUSY
+    if robot.domain.objects[tool].kind != "tool":
+        return FailureReason.NOT_A_TOOL
+    if robot.perception.covered_by(obj) or robot.perception.supports(obj):
+        return FailureReason.COVERED
+    return None
+
+
+def obstacles(robot: Robot, *but: str) -> dict[str, tuple[Capsule, ...]]:
+    """What everything else covers of the table: what lies on it, by name."""
+    held = {robot.perception.held(hand) for hand in HANDS}
+    return {
+        name: footprint(robot.domain.objects[name].shape, robot.world.pose(name))
+        for name in robot.world.scenario.objects
+        if name not in but and name not in held
+    }
+
+
+def is_free(robot: Robot, tool: HeldTool, sweep: Sweep, others: dict[str, tuple[Capsule, ...]]) -> bool:
+    """Whether tool, fingers and palm pass all obstacles on the way, beside them or over them."""
+    table = robot.scene.table.height
+    tops = {name: robot.top_of(name) - table for name in others}
+    for head in sweep.heads():
+        palm = tool.palm(head, sweep.yaw)
+        parts = tool.covers(head, sweep.yaw, sweep.pitch)
+        for name, capsules in others.items():
+            low = [part for part, underside in parts if underside < tops[name] + OVER]
+            if smallest_gap(low, capsules) < MARGIN:
+                return False
+            if tops[name] > PALM_HEIGHT + tool.grip * math.sin(sweep.pitch) and (
+                smallest_gap([palm], capsules) < 0
+            ):
+                return False
+    return True
+
+
+def first_feasible(robot: Robot, tool: HeldTool, sweeps: Iterable[Sweep], limit: int = 30) -> Motion | None:
+    """The motion for the first of the sweeps (at most `limit` are tried) that the arm can do."""
+    for sweep in itertools.islice(sweeps, limit):
+        motion = _solve(robot, tool, sweep)
+        if motion is not None:
+            return motion
+    return None
+
+
+def _solve(robot: Robot, tool: HeldTool, sweep: Sweep) -> Motion | None:
+    # The head's lowest edge is the one away from the handle.
+    half = tool.shape.width / 2 * (math.cos(sweep.pitch) + math.sin(sweep.pitch))
+    low = robot.scene.table.height + half + FLOAT
+    kinematics, hand, idle = robot.kinematics, tool.hand, robot.idle_target(tool.hand)
+
+    def at(place: Point, height: float) -> HandTarget:
+        return tool.target(np.array([*place, height]), sweep.yaw, sweep.pitch)
+
+    # Both ends are asked for first to give up early: sweeps that fail, fail there.
+    rest = robot.rest(hand)
+    for place in (sweep.end, sweep.start):
+        if kinematics.solve(hand, at(place, low), rest, idle=idle, restarts=1) is None:
+            return None
+    above = kinematics.solve(hand, at(sweep.start, low + LIFT), rest, idle=idle)
+    if above is None:
+        return None
+    legs: list[list[Joints]] = []
+    joints: Joints = above
+    for begin, end, pieces in (
+        (at(sweep.start, low + LIFT), at(sweep.start, low), 4),
+        (at(sweep.start, low), at(sweep.end, low), max(2, math.ceil(sweep.length / _PIECE))),
+        (at(sweep.end, low), at(sweep.end, low + LIFT), 4),
+    ):
+        leg = kinematics.line(hand, begin, end.p_WP, joints, idle=idle, pieces=pieces)
+        if leg is None:
+            return None
+        legs.append(leg)
+        joints = leg[-1]
+    down, along, up = legs
+    return Motion(above, down, along, up, max(0.6, 0.95 * sweep.length / SPEED))
+
+
+def perform(robot: Robot, tool: HeldTool, motion: Motion) -> FailureReason:
+    """Carry out a sweep and take the tool aside again."""
+    robot.travel(motion.above)
+    if robot.perception.held(tool.hand) != tool.name:
+        return _lost(robot, tool.hand)
+    robot.world.follow(motion.down, 1.0)
+    robot.world.hold(0.1)
+    robot.world.follow(motion.along, motion.seconds)
+    robot.world.hold(0.1)
+    robot.world.follow(motion.up, 1.0)
+    if robot.perception.held(tool.hand) != tool.name:
+        return _lost(robot, tool.hand)
+    carry_tool(robot, tool.hand, tool.name)
+    return FailureReason.NONE if robot.perception.held(tool.hand) == tool.name else FailureReason.SLIPPED
+
+
+def _lost(robot: Robot, hand: str) -> FailureReason:
+    release(robot, hand, STROKE)
+    robot.go_home(hand)
+    return FailureReason.SLIPPED
+
+
+CARRY_YAWS: Sequence[float] = (0.7, 0.5, 0.9, 0.3)  # rad outwards
+CARRY_PLACE = (-0.22, 0.22)  # m, x and |y| of the hand
+CARRY_LIFT = 0.18  # m above the table
+
+
+def carry_tool(robot: Robot, hand: str, name: str) -> None:
+    """Hold the tool up and sideways, where the other hand can work in front of the robot."""
+    tool = held_tool(robot, name, hand)
+    assert tool is not None
+    side = -1.0 if hand == "LeftHand" else 1.0
+    x, y = CARRY_PLACE[0], side * CARRY_PLACE[1]
+    height = robot.scene.table.height + CARRY_LIFT
+    for outwards in CARRY_YAWS:
+        yaw = -side * outwards
+        head = np.array([x - tool.grip * math.cos(yaw), y - tool.grip * math.sin(yaw), height])
+        joints = robot.kinematics.solve(
+            hand, tool.target(head, yaw), robot.rest(hand), idle=robot.idle_target(hand)
+        )
+        if joints is not None:
+            robot.travel(joints)
+            break
+    robot.grips[hand].carrying = robot.world.command
