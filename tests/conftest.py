@@ -1,9 +1,15 @@
-"""Shared fixtures: the sandwich domain and small states."""
+"""Shared fixtures: the sandwich domain, small states, and the command line as a program sees it."""
 
 from __future__ import annotations
 
+import json
+import sys
+from pathlib import Path
+from typing import Any
+
 import pytest
 
+from cognitive_arch import cli
 from cognitive_arch.domain import Domain, load_domain
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
@@ -51,3 +57,26 @@ def start() -> State:
     """The simple scene: everything on the table and within reach."""
     reach = [f"reachableWith({p},{e})" for p in PARTS for e in (*HANDS, *PARTS) if e != p]
     return state(*(f"isHand({h})" for h in HANDS), *(f"isClear({h})" for h in HANDS), *reach)
+
+
+class Answer:
+    def __init__(self, code: int, out: str, err: str) -> None:
+        self.code, self.out, self.err = code, out, err
+
+    @property
+    def json(self) -> dict[str, Any]:
+        return json.loads(self.out)  # type: ignore[no-any-return]
+
+
+@pytest.fixture
+def cogarch(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
+    monkeypatch.setenv("COGARCH_STORE", str(tmp_path / "runs"))
+
+    def call(*args: str) -> Answer:
+        monkeypatch.setattr(sys, "argv", ["cogarch", *args])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        captured = capsys.readouterr()
+        return Answer(int(ended.value.code or 0), captured.out, captured.err)
+
+    return call

@@ -11,7 +11,6 @@ from typing import Any
 
 import pytest
 
-from cognitive_arch import cli
 from cognitive_arch.domain import load_domain
 
 SANDWICH = "make a ham sandwich"
@@ -22,29 +21,6 @@ objects:
   Ham: {position: [-0.3, 0.1]}
   Bun-bottom: {position: [-0.3, -0.1]}
 """
-
-
-class Answer:
-    def __init__(self, code: int, out: str, err: str) -> None:
-        self.code, self.out, self.err = code, out, err
-
-    @property
-    def json(self) -> dict[str, Any]:
-        return json.loads(self.out)  # type: ignore[no-any-return]
-
-
-@pytest.fixture
-def cogarch(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> Any:
-    monkeypatch.setenv("COGARCH_STORE", str(tmp_path / "runs"))
-
-    def call(*args: str) -> Answer:
-        monkeypatch.setattr(sys, "argv", ["cogarch", *args])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        captured = capsys.readouterr()
-        return Answer(int(ended.value.code or 0), captured.out, captured.err)
-
-    return call
 
 
 def test_parse(cogarch: Any) -> None:

@@ -10,9 +10,9 @@ import pytest
 
 from cognitive_arch.demos import load_demos, read_demos
 from cognitive_arch.errors import ConfigError
+from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.runlog.store import RunStore
 from cognitive_arch.session import RunConfig, run_task
-from tests.test_cli import cogarch  # noqa: F401 (a fixture)
 
 SEEDS = range(10)
 DEMOS = load_demos()
@@ -123,23 +123,25 @@ def test_missing_in_physics(tmp_path: Path) -> None:
 
 @pytest.mark.physics
 def test_sabotage_in_physics(tmp_path: Path) -> None:
-    result, steps = play("sabotage", tmp_path, backend="drake", record=False)
+    config = RunConfig(record=False, events=(OutsideEvent.parse("4:move:Ham:-0.35,0.15"),))
+    result, steps = perform("make a ham sandwich", config, tmp_path)
     assert result["success"]
-    assert {"on(Tomato,Cheese)", "on(Bun-top,Tomato)"} <= set(result["final_state"])
-    assert told(steps, "goal_maintenance") == ["on(Tomato,Cheese) no longer holds: back to sub-goal 4"]
+    assert {"on(Ham,Bun-bottom)", "on(Bun-top,Ham)"} <= set(result["final_state"])
+    assert told(steps, "outside") == ["Ham was moved to (-0.350, 0.150)"]
+    assert told(steps, "goal_maintenance") == ["on(Ham,Bun-bottom) no longer holds: back to sub-goal 2"]
 
 
 # -- the verb ---------------------------------------------------------------------------------------
 
 
-def test_demos_are_listed(cogarch: Any) -> None:  # noqa: F811
+def test_demos_are_listed(cogarch: Any) -> None:
     answer = cogarch("demo")
     assert answer.code == 0
     assert [line.split()[0] for line in answer.out.splitlines()] == list(DEMOS.demos)
     assert [demo["name"] for demo in cogarch("demo", "--json").json["demos"]] == list(DEMOS.demos)
 
 
-def test_a_demo_says_what_to_look_at_and_how_to_vary_it(cogarch: Any) -> None:  # noqa: F811
+def test_a_demo_says_what_to_look_at_and_how_to_vary_it(cogarch: Any) -> None:
     answer = cogarch("demo", "slip", "--backend", "symbolic", "--seed", "3")
     assert answer.code == 0
     assert "look at" in answer.out
@@ -152,7 +154,7 @@ def test_a_demo_says_what_to_look_at_and_how_to_vary_it(cogarch: Any) -> None:  
     assert "outside: Ham slipped from LeftHand" in shown
 
 
-def test_a_demo_that_ends_with_a_report_exits_1(cogarch: Any) -> None:  # noqa: F811
+def test_a_demo_that_ends_with_a_report_exits_1(cogarch: Any) -> None:
     answer = cogarch("demo", "missing", "--backend", "symbolic", "--json")
     assert answer.code == 1
     assert answer.json["demo"] == "missing"
@@ -172,7 +174,7 @@ def test_a_demo_that_ends_with_a_report_exits_1(cogarch: Any) -> None:  # noqa: 
         ),
     ],
 )
-def test_bad_input_gets_one_line(cogarch: Any, args: str, says: str) -> None:  # noqa: F811
+def test_bad_input_gets_one_line(cogarch: Any, args: str, says: str) -> None:
     answer = cogarch(*args.split())
     assert answer.code == 2
     assert answer.out == ""
@@ -181,7 +183,7 @@ def test_bad_input_gets_one_line(cogarch: Any, args: str, says: str) -> None:  #
 
 
 def test_events_of_the_scene_and_of_the_command_line_add_up(
-    cogarch: Any,  # noqa: F811
+    cogarch: Any,
     tmp_path: Path,
 ) -> None:
     scene = tmp_path / "mine.yaml"
