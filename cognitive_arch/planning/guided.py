@@ -3,7 +3,8 @@
 Rules that cannot come to apply, or lead nowhere near the goal, are left out; where the goal cannot be
 reached at all, that is known without a sample. Of the remaining actions those that begin a relaxed plan
 from where a sequence has got to are sampled more often (see `guidance`), and sampling stops when more of it
-hardly helps.
+hardly helps. Because a product of marginals may promise what the rules do not keep, the best sequences are
+tried in sampled worlds before one is believed.
 """
 
 from __future__ import annotations
@@ -14,7 +15,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cognitive_arch.planning.base import PlanResult
+from cognitive_arch.planning.evaluation import evaluate_by_sampling
 from cognitive_arch.planning.guidance import Guidance, make_guidance
+from cognitive_arch.planning.kernels import evaluate_sequences
 from cognitive_arch.planning.prada import APrada, Samples, Sequence
 from cognitive_arch.planning.problem import Problem
 from cognitive_arch.planning.relaxed import (
@@ -26,6 +29,12 @@ from cognitive_arch.planning.relaxed import (
     relevant_rules,
 )
 from cognitive_arch.planning.sampling import sample_sequences
+
+TRIALS = 400
+"""How often a plan is tried, by the rules themselves, before it is believed."""
+
+CANDIDATES = 30
+"""How many of the best sequences are tried before there is said to be no plan."""
 
 
 @dataclass(frozen=True)
@@ -51,29 +60,66 @@ class GuidedPrada(APrada):
             return self._result(problem, None, horizon)
         problem = problem.keep(relevant_rules(problem, operators, costs.cost))
         guidance = make_guidance(problem, relax(problem), self.share)
-        return self._result(problem, self._guided(problem, guidance, horizon, rng), horizon)
+        start = float(np.prod(a.start[a.goal]))
+        for sequence in self._candidates(problem, guidance, horizon, start + self.margin, rng):
+            if self._helps(problem, sequence, start, rng):
+                better = self._improve(problem, sequence)
+                believed = self._helps(problem, better, start, rng)
+                return self._result(problem, better if believed else sequence, horizon)
+        return self._result(problem, None, horizon)
 
-    def _guided(
-        self, problem: Problem, guidance: Guidance, horizon: int, rng: np.random.Generator
-    ) -> Sequence | None:
-        a = problem.arrays
-        enough = float(np.prod(a.start[a.goal])) + self.margin
-        best: Sequence | None = None
-        best_value, drawn = -1.0, 0
+    def _candidates(
+        self, problem: Problem, guidance: Guidance, horizon: int, enough: float, rng: np.random.Generator
+    ) -> list[Sequence]:
+        """The best distinct sequences that were sampled and raise the goal's probability above `enough`."""
+
+        def sample(problem: Problem, draws: NDArray[np.float64]) -> Samples:
+            choices, values, peaks = sample_sequences(
+                problem.arrays, guidance, draws, self.discount, self.threshold
+            )
+            return guidance.action[choices], values, peaks
+
+        found: dict[bytes, tuple[float, Sequence]] = {}
+        best, drawn = 0.0, 0
         while drawn < self.samples:
             count = min(max(self.first_round, drawn), self.samples - drawn)
             drawn += count
-
-            def part(problem: Problem, draws: NDArray[np.float64]) -> Samples:
-                choices, values, peaks = sample_sequences(a, guidance, draws, self.discount, self.threshold)
-                return guidance.action[choices], values, peaks
-
-            sequences, values, peaks = self._share_out(part, problem, rng.random((horizon, count)))
-            values = np.where(peaks > enough, values, -1.0)
-            top = int(values.argmax())
-            before = best_value
-            if values[top] > best_value:
-                best, best_value = sequences[:, top], float(values[top])
-            if before > 0 and best_value - before < self.gain * before:
+            sequences, values, peaks = self._share_out(sample, problem, rng.random((horizon, count)))
+            for n in np.flatnonzero(peaks > enough):
+                sequence = np.ascontiguousarray(sequences[:, n])
+                found.setdefault(sequence.tobytes(), (float(values[n]), sequence))
+            before, best = best, max((value for value, _ in found.values()), default=0.0)
+            if 0 < best < (1 + self.gain) * before:
                 break
-        return None if best is None else self._shorten(problem, best)
+        ranked = sorted(found.values(), key=lambda entry: -entry[0])
+        return [sequence for _, sequence in ranked[:CANDIDATES]]
+
+    def _helps(self, problem: Problem, sequence: Sequence, start: float, rng: np.random.Generator) -> bool:
+        """Whether `sequence` raises the goal's probability above `start` by the rules themselves.
+
+        What a product of marginals promises wrongly mostly has no chance at all, so a fifth of the margin is
+        enough: `margin` itself is a measure for PRADA's estimate.
+        """
+        tried = evaluate_by_sampling(problem, sequence.tolist(), rng, TRIALS)
+        return tried.peak > start + self.margin / 5
+
+    def _improve(self, problem: Problem, sequence: Sequence) -> Sequence:
+        """Take out what does not help, then put in actions of the plan once more where that helps."""
+        sequence = self._shorten(problem, sequence, ties=True)
+        value, _ = self._evaluate(problem, sequence)
+        while sequence[-1] == problem.idle:
+            steps = np.flatnonzero(sequence != problem.idle)
+            longer = [
+                np.insert(sequence[:-1], place, action)
+                for place in range(steps[-1] + 2 if len(steps) else 1)
+                for action in dict.fromkeys(sequence[steps].tolist())
+            ]
+            if not longer:
+                break
+            tried = np.ascontiguousarray(np.stack(longer, axis=1), dtype=np.int32)
+            values, _, _ = evaluate_sequences(problem.arrays, tried, self.discount, self.threshold)
+            top = int(values.argmax())
+            if values[top] <= value * (1 + 1e-9):
+                break
+            sequence, value = tried[:, top], float(values[top])
+        return sequence

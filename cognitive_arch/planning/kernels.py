@@ -15,6 +15,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from cognitive_arch.planning.problem import Arrays
+
 BLOCK = 32
 """Actions per block: the masses of a block are summed again only if one of them changed."""
 
@@ -287,17 +289,32 @@ def undo(p, s, atoms, rules, actions):  # type: ignore[no-untyped-def]
 
 
 @numba.njit(cache=True, nogil=True)
-def evaluate_sequence(p, sequence, discount, threshold):  # type: ignore[no-untyped-def]
+def evaluate_sequences(p, sequences, discount, threshold):  # type: ignore[no-untyped-def]
+    """Values (n,), peak goal probabilities (n,) and final beliefs (n, n_atoms) of sequences (horizon, n)."""
+    horizon, n = sequences.shape
+    values, peaks, beliefs = np.empty(n), np.empty(n), np.empty((n, len(p.start) // 2))
+    s = make_scratch(p, threshold, horizon)
+    for i in range(n):
+        goal = goal_probability(p, s.prob)
+        values[i], peaks[i] = goal, goal
+        for t in range(horizon):
+            if sequences[t, i] != len(p.action_ptr) - 1:
+                mark = s.length[ATOMS]
+                advance(p, s, sequences[t, i])
+                refresh(p, s, threshold, mark)
+                goal = goal_probability(p, s.prob)
+            values[i] += discount ** (t + 1) * goal
+            peaks[i] = max(peaks[i], goal)
+        for atom in range(beliefs.shape[1]):
+            beliefs[i, atom] = s.prob[2 * atom + 1]
+        undo(p, s, 0, 0, 0)
+    return values, peaks, beliefs
+
+
+def evaluate_sequence(
+    p: Arrays, sequence: NDArray[np.int32], discount: float, threshold: float
+) -> tuple[float, float, NDArray[np.float64]]:
     """Value, peak goal probability and final belief (n_atoms,) of one sequence of action numbers."""
-    s = make_scratch(p, threshold, len(sequence))
-    goal = goal_probability(p, s.prob)
-    value, peak = goal, goal
-    for t in range(len(sequence)):
-        if sequence[t] != len(p.action_ptr) - 1:
-            mark = s.length[ATOMS]
-            advance(p, s, sequence[t])
-            refresh(p, s, threshold, mark)
-            goal = goal_probability(p, s.prob)
-        value += discount ** (t + 1) * goal
-        peak = max(peak, goal)
-    return value, peak, s.prob[1::2].copy()
+    column = np.ascontiguousarray(sequence, dtype=np.int32)[:, None]
+    values, peaks, beliefs = evaluate_sequences(p, column, discount, threshold)
+    return float(values[0]), float(peaks[0]), beliefs[0]

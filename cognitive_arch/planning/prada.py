@@ -96,10 +96,8 @@ class Prada(ArrayPlanner):
 
     def _evaluate(self, problem: Problem, sequence: Sequence) -> tuple[float, float]:
         """Value and highest goal probability of `sequence`."""
-        value, peak, _ = kernels.evaluate_sequence(
-            problem.arrays, np.ascontiguousarray(sequence), self.discount, self.threshold
-        )
-        return float(value), float(peak)
+        value, peak, _ = kernels.evaluate_sequence(problem.arrays, sequence, self.discount, self.threshold)
+        return value, peak
 
 
 @dataclass(frozen=True)
@@ -116,8 +114,8 @@ class APrada(Prada):
                 return self._shorten(problem, sequence)
         return None
 
-    def _shorten(self, problem: Problem, sequence: Sequence) -> Sequence:
-        """Delete one action at a time, keeping a deletion that raises the value.
+    def _shorten(self, problem: Problem, sequence: Sequence, ties: bool = False) -> Sequence:
+        """Delete one action at a time, keeping a deletion that raises the value (or, with `ties`, keeps it).
 
         The freed step at the end is spent doing nothing, so that all values sum over the same steps.
         """
@@ -127,7 +125,7 @@ class APrada(Prada):
         while position < len(sequence):
             shorter = np.append(np.delete(sequence, position), idle).astype(np.int32)
             shorter_value, _ = self._evaluate(problem, shorter)
-            if shorter_value > value:
+            if shorter_value > value or (ties and shorter_value == value and sequence[position] != idle):
                 sequence, value = shorter, shorter_value
             else:
                 position += 1

@@ -8,16 +8,25 @@ relaxed plans: Bonet and Geffner 2001; Hoffmann and Nebel 2001).
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import itertools
+import math
+from collections.abc import Iterator
+from typing import NamedTuple, TypeAlias
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from cognitive_arch.planning.problem import ANY_OF, CLOSURE, Floats, Ints, Problem
+from cognitive_arch.planning.problem import ANY_OF, CLOSURE, COMPARISONS, Floats, Ints, Problem
+from cognitive_arch.relational.derived import Comparison
 
 NEVER = 1e9
 """Cost of what cannot be reached."""
+
+MOST_NEEDS = 500
+"""How many ways to make one derived atom true, or false, are told apart."""
+
+Needs: TypeAlias = list[tuple[int, ...]]
 
 SURPRISE = 1.0
 """What an outcome costs beyond one step, per nat of its improbability."""
@@ -66,35 +75,95 @@ def relax(problem: Problem) -> Operators:
     )
 
 
-def _axioms(problem: Problem, d: int) -> list[tuple[list[int], int]]:
+def _axioms(problem: Problem, d: int) -> Iterator[tuple[tuple[int, ...], int]]:
     """(needed literals, literal that follows) for one definition.
 
-    That a derived atom is false, and what a count compares to, is taken to be free: an optimistic answer
-    is all that a relaxation promises.
+    Where exact needs would be too many, some that are necessary stand for them: a relaxation may promise
+    too much, never too little.
     """
     a = problem.arrays
     row = a.derived[a.derived_ptr[d] : a.derived_ptr[d + 1]].tolist()
-    if a.derived_kind[d] == ANY_OF:
-        axioms: list[tuple[list[int], int]] = [([], 2 * row[0])]
-        k = 1
-        while k < len(row):
-            axioms.append((row[k + 1 : k + 1 + row[k]], 2 * row[0] + 1))
-            k += 1 + row[k]
-        return axioms
     if a.derived_kind[d] == CLOSURE:
         n = row[0]
         base, closed = np.reshape(row[1:], (2, n, n)).tolist()
-        pairs = [(i, j) for i in range(n) for j in range(n)]
-        axioms = [([], 2 * closed[i][j]) for i, j in pairs]
-        axioms += [([2 * base[i][j] + 1], 2 * closed[i][j] + 1) for i, j in pairs]
-        axioms += [
-            ([2 * base[i][k] + 1, 2 * closed[k][j] + 1], 2 * closed[i][j] + 1)
-            for i, j in pairs
-            for k in range(n)
-            if k not in (i, j)
-        ]
-        return axioms
-    return [([], 2 * row[0]), ([], 2 * row[0] + 1)]
+        for i, j in itertools.product(range(n), repeat=2):
+            yield (2 * base[i][j],), 2 * closed[i][j]
+            yield (2 * base[i][j] + 1,), 2 * closed[i][j] + 1
+            for k in set(range(n)) - {i, j}:
+                yield (2 * base[i][k] + 1, 2 * closed[k][j] + 1), 2 * closed[i][j] + 1
+        return
+    if a.derived_kind[d] == ANY_OF:
+        true, false = _any_of(row)
+    else:
+        true, false = _count(row[1], row[2], row[3:])
+    yield from ((need, 2 * row[0] + 1) for need in true)
+    yield from ((need, 2 * row[0]) for need in false)
+
+
+def _any_of(row: list[int]) -> tuple[Needs, Needs]:
+    """What makes a disjunction of conjunctions true, and what makes it false."""
+    groups, k = [], 1
+    while k < len(row):
+        groups.append(tuple(row[k + 1 : k + 1 + row[k]]))
+        k += 1 + row[k]
+    if math.prod(len(group) for group in groups) <= MOST_NEEDS:
+        broken = [tuple(lit ^ 1 for lit in chosen) for chosen in itertools.product(*groups)]
+    else:  # at least the smallest group must be broken
+        broken = [(literal ^ 1,) for literal in min(groups, key=len)]
+    return groups, broken
+
+
+def _count(comparison: int, value: int, literals: list[int]) -> tuple[Needs, Needs]:
+    """What makes a compared count true, and what makes it false."""
+
+    def least(wanted: int, among: list[int]) -> Needs:
+        """At least `wanted` of `among`."""
+        if wanted <= 0:
+            return [()]
+        if wanted > len(among):
+            return []
+        if math.comb(len(among), wanted) > MOST_NEEDS:
+            return [(literal,) for literal in among]
+        return list(itertools.combinations(among, wanted))
+
+    def at_least(n: int) -> Needs:
+        return least(n, literals)
+
+    def at_most(n: int) -> Needs:
+        return least(len(literals) - n, [literal ^ 1 for literal in literals])
+
+    match COMPARISONS[comparison]:
+        case Comparison.GREATER_EQUAL:
+            return at_least(value), at_most(value - 1)
+        case Comparison.GREATER:
+            return at_least(value + 1), at_most(value)
+        case Comparison.LESS_EQUAL:
+            return at_most(value), at_least(value + 1)
+        case Comparison.LESS:
+            return at_most(value - 1), at_least(value)
+        case Comparison.EQUAL:
+            exact = at_least(value)
+            if 0 <= value <= len(literals) and math.comb(len(literals), value) <= MOST_NEEDS:
+                chosen = itertools.combinations(literals, value)
+                exact = [(*some, *(lit ^ 1 for lit in literals if lit not in some)) for some in chosen]
+            return exact, at_least(value + 1) + at_most(value - 1)
+
+
+def _atoms_of(problem: Problem, d: int) -> tuple[Ints, Ints]:
+    """The atoms that one definition gives a value to, and those it looks at."""
+    a = problem.arrays
+    row = a.derived[a.derived_ptr[d] : a.derived_ptr[d + 1]]
+    if a.derived_kind[d] == CLOSURE:
+        base, closed = np.split(row[1:], 2)
+        return closed, base
+    if a.derived_kind[d] == ANY_OF:
+        literals: list[int] = []
+        k = 1
+        while k < len(row):
+            literals.extend(row[k + 1 : k + 1 + row[k]])
+            k += 1 + row[k]
+        return row[:1], np.array(literals, dtype=np.int32) >> 1
+    return row[:1], row[3:] >> 1
 
 
 def _rows(rows: list[NDArray[np.int32]]) -> tuple[Ints, Ints]:
@@ -256,20 +325,27 @@ def relevant_rules(problem: Problem, operators: Operators, cost: Floats) -> NDAr
     adder = np.repeat(np.arange(len(o.cost)), np.diff(o.add_ptr))
     reader = np.repeat(np.arange(len(a.rule_action)), np.diff(a.context_ptr))
     has_siblings = np.diff(a.action_ptr)[a.rule_action] > 1
+    definitions = [_atoms_of(problem, d) for d in range(len(a.derived_kind))]
     reachable = np.ones(len(o.cost), dtype=np.bool_)
     reachable[owner[cost[o.need] >= NEVER]] = False
     wanted = np.zeros(len(a.start), dtype=np.bool_)
     wanted[a.goal] = True
+    n_wanted = -1
     used = np.zeros(len(o.cost), dtype=np.bool_)
     actions = np.zeros(len(problem.actions), dtype=np.bool_)
     while True:
         now = np.zeros_like(used)
         now[adder[wanted[o.add]]] = True
         now &= reachable
-        if (now == used).all():
+        if (now == used).all() and wanted.sum() == n_wanted:
             break
+        n_wanted = wanted.sum()
         used = now
         wanted[o.need[used[owner]]] = True
+        for defined, looked_at in reversed(definitions):
+            # Axioms may leave out needs, so whatever bears on a wanted derived atom is wanted, either way.
+            if wanted[2 * defined].any() or wanted[2 * defined + 1].any():
+                wanted[2 * looked_at] = wanted[2 * looked_at + 1] = True
         actions[a.rule_action[o.rule[used & (o.rule >= 0)]]] = True
         rivals = actions[a.rule_action] & has_siblings
         wanted[a.context[rivals[reader]] ^ 1] = True
