@@ -77,7 +77,11 @@ class OraclePerception:
         X_WO = world.pose(name)
         x, y, z = (float(v) for v in X_WO.translation())
         spec = world.domain.objects[name]
-        tools = [t for t in world.scenario.objects if world.domain.objects[t].kind == "tool" and t != name]
+        tools = [
+            t
+            for t in world.scenario.objects
+            if world.domain.objects[t].kind == "tool" and t != name and not self._fallen(t)
+        ]
         holder = next((hand for hand in HANDS if self.held(hand) == name), None)
         hands = [hand for hand in HANDS if holder or self._kinematics.reaches(hand, x, y)]
         distance = math.hypot(x, y)

@@ -215,3 +215,15 @@ def test_things_nobody_knows_of_cannot_be_disturbed(environment: Environment) ->
     for event in ("remove:Unicorn", "move:Cheese:-0.3,0.1", "add:Unicorn:-0.3,0.1", "topple:Cheese"):
         assert happen(environment, event) == ()
     assert environment.observe() == before
+
+
+@pytest.mark.parametrize("backend", ["symbolic", DRAKE])
+def test_nothing_is_said_of_a_tool_that_is_not_there(backend: str) -> None:
+    env = build(backend, "1:add:Rake:-0.45,0.25")
+    env.reset(0)
+    assert not [a for a in atoms(env) if "Rake" in a]
+    assert happen(env, "add:Rake:-0.45,0.25") == ("Rake",)
+    assert "reachableWith(Ham,Rake)" in atoms(env)
+    assert happen(env, "remove:Rake") == ("Rake",)
+    assert not [a for a in atoms(env) if "Rake" in a]
+    env.close()
