@@ -197,7 +197,7 @@ def plan(
     else:
         answer = dry_run.evaluate_given(load, actions, settings)
     _print(answer, dry_run.plan_text(answer), as_json)
-    if answer.get("status") == "no_plan":
+    if answer.get("status") == "no_plan" and answer["diagnosis"]["verdict"] != "holds":
         raise typer.Exit(1)
 
 
@@ -260,7 +260,8 @@ def _guarded() -> int:
 
 
 def _interrupted() -> int:
-    print("interrupted; finished steps are kept, see: cogarch inspect", file=sys.stderr)
+    kept = "; finished steps are kept, see: cogarch inspect" if {"run", "demo"} & set(sys.argv[1:2]) else ""
+    print(f"interrupted{kept}", file=sys.stderr)
     return INTERRUPTED
 
 

@@ -20,18 +20,23 @@ from cognitive_arch.execution.backends import make_environment
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.planning.base import ArrayPlanner, Planner, PlanResult, check_problem
 from cognitive_arch.planning.compilation import warm_up
-from cognitive_arch.planning.diagnosis import diagnose
+from cognitive_arch.planning.diagnosis import Verdict, diagnose
 from cognitive_arch.planning.evaluation import evaluate
+from cognitive_arch.planning.kernels import evaluate_sequence
+from cognitive_arch.planning.prada import Prada
 from cognitive_arch.planning.problem import Problem, compile_problem
 from cognitive_arch.planning.registry import make_planner
 from cognitive_arch.relational.libprada import load_problem
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
 from cognitive_arch.relational.symbols import Goal, GroundAction, Literal, State, parse_literal
 from cognitive_arch.resources import read_text
-from cognitive_arch.session import Setting
+from cognitive_arch.session import Setting, Task
 from cognitive_arch.world.anchoring import WorldModel
 
-EXAMPLE = "on(Ham,Bun-bottom), not isClear(LeftHand)"
+MOST_SAMPLED_ACTIONS = 20_000_000
+"""Samples times horizon: more take minutes and gigabytes."""
+
+EXAMPLE = "on(Ham,Bun-bottom), not isClear(LeftHand) (with commas in between)"
 """What literals look like, for messages."""
 
 
@@ -61,8 +66,11 @@ class PlanSettings:
                 raise ConfigError(f"{name} {value} is out of range; valid: {least} to 1000")
         if not 0 <= self.seed < 2**63:
             raise ConfigError(f"seed {one_line(self.seed, 30)} is out of range; valid: 0 to {2**63 - 1}")
-        if self.samples is not None and not 1 <= self.samples <= 10_000_000:
-            raise ConfigError(f"samples {self.samples} is out of range; valid: 1 to 10000000")
+        most = MOST_SAMPLED_ACTIONS // self.horizon
+        if self.samples is not None and not 1 <= self.samples <= most:
+            raise ConfigError(
+                f"samples {self.samples} is out of range; valid with horizon {self.horizon}: 1 to {most}"
+            )
 
 
 def libprada_task(symbols: Path, rules: Path, state: Path, goal: Path) -> PlanningTask:
@@ -79,6 +87,8 @@ def scene_task(
     The goal is what `sentence` means in the end, or literals: `goal` holds them itself or names a file
     with them. `state` is a file of literals to start from instead.
     """
+    if rules is not None:
+        _refuse_libprada(Path(rules))
     setting = Setting.load(scene, rules)
     if (goal is None) == (sentence is None):
         raise ConfigError('say what to plan for: either a sentence or --goal "on(Ham,Bun-bottom), ..."')
@@ -93,13 +103,37 @@ def scene_task(
         text = read_text(state, "state file", RuleError)
         facts = _literals(text, str(state), setting.rules, world.entities)
         start = frozenset(literal.atom for literal in facts if literal.positive)
+    ground = setting.rules.ground(world.entities)
     if sentence is not None:
-        wanted = setting.understand(sentence).goals[-1]
-    elif goal is not None and Path(goal).is_file():
+        wanted = _likeliest_goal(setting.understand(sentence), start, ground)
+    elif goal is not None and _is_file(goal):
         wanted = _literals(read_text(Path(goal), "goal file", RuleError), goal, setting.rules, world.entities)
     else:
         wanted = _literals(str(goal), "--goal", setting.rules, world.entities)
-    return PlanningTask(start, wanted, setting.rules.ground(world.entities))
+    return PlanningTask(start, wanted, ground)
+
+
+def _likeliest_goal(task: Task, start: State, rules: Sequence[GroundRule]) -> Goal:
+    """What is to be true in the end, with the hand that can do it if the sentence names none."""
+    goals = [task.goals[-1], *(other[-1] for other in task.alternatives)]
+    for goal in goals:
+        if diagnose(start, goal, rules, 1).verdict is not Verdict.UNREACHABLE:
+            return goal
+    return goals[0]
+
+
+def _is_file(text: str) -> bool:
+    try:
+        return Path(text).is_file()
+    except OSError:  # too long for a name: it is literals
+        return False
+
+
+def _refuse_libprada(rules: Path) -> None:
+    """libPRADA's rules cannot be read without its symbols; say so rather than complain of their syntax."""
+    text = read_text(rules, "rules file", RuleError)
+    if re.search(r"^ACTION:", text, re.MULTILINE):
+        raise ConfigError(f"{one_line(rules, 200)} looks like libPRADA's: give its --symbols file, too")
 
 
 def loader(
@@ -115,6 +149,8 @@ def loader(
         return lambda: scene_task(scene, goal, sentence, rules, state)
     if sentence is not None:
         raise ConfigError("a sentence needs a scene: leave --symbols away, or say what to plan for by --goal")
+    if goal is not None and not _is_file(goal):
+        raise ConfigError(f"no goal file at '{one_line(goal)}'; with --symbols, --goal names a file")
     if rules is None or state is None or goal is None:
         given = {"--rules": rules, "--state": state, "--goal": goal}
         missing = ", ".join(name for name, value in given.items() if value is None)
@@ -144,6 +180,9 @@ def _literals(text: str, source: str, rules: RuleSet, entities: Sequence[Entity]
                 if arg not in names:
                     raise RuleError(f"{where}: {unknown('entity', arg, names)}")
             found.append(literal)
+    for literal in found:
+        if literal.negated() in found:
+            raise RuleError(f"{source}: {literal.atom} is said to be both true and false; valid: one of them")
     if not found:
         raise RuleError(f"{source}: there is no literal; valid: {EXAMPLE}")
     return tuple(dict.fromkeys(found))
@@ -236,10 +275,18 @@ def evaluate_given(load: Callable[[], PlanningTask], actions: str, settings: Pla
     given = tuple(_action(part) for part in _split(actions))
     if not given:
         raise ConfigError("there is no action in --actions; valid: graspWith(Ham,LeftHand), ...")
+    evaluation = _evaluation(task, problem, given, settings)
+    numbers = {action: n for n, action in enumerate(problem.actions)}
+    horizon = max(settings.horizon, len(given))
+    sequence = np.full(horizon, problem.idle, dtype=np.int32)
+    sequence[: len(given)] = [numbers.get(action, problem.idle) for action in given]
+    value, peak, _ = evaluate_sequence(problem.arrays, sequence, Prada.discount, Prada.threshold)
     return {
+        "value": value,
+        "goal_probability": peak,
         "goal": list(map(str, task.goal)),
-        "horizon": settings.horizon,
-        "evaluation": _evaluation(task, problem, given, settings),
+        "horizon": horizon,
+        "evaluation": evaluation,
     }
 
 
@@ -265,9 +312,9 @@ def plan_text(answer: dict[str, Any]) -> str:
         lines += [f"{n:>3}  {action}" for n, action in enumerate(answer["plan"], 1)]
     elif "status" in answer:
         lines.append(f"no plan      {answer['explanation']}")
+    lines.append(f"estimate     probability {answer['goal_probability']:.3f}, value {answer['value']:.3f}")
     if "planner" in answer:
         lines += [
-            f"estimate     probability {answer['goal_probability']:.3f}, value {answer['value']:.3f}",
             f"planner      {answer['planner']}, horizon {answer['horizon']}, "
             + (f"at most {answer['samples']} samples, " if answer["samples"] else "")
             + f"seed {answer['seed']}",
@@ -280,6 +327,6 @@ def plan_text(answer: dict[str, Any]) -> str:
         steps = " ".join(f"{p:.3f}" for p in found["steps"])
         lines += [
             f"by the rules {found['probability']:.3f} in the end, {found['ever']:.3f} at some time ({how})",
-            f"step by step {steps}",
+            f"steps 0 to {len(found['steps']) - 1}".ljust(13) + steps,
         ]
     return "\n".join(lines)

@@ -39,7 +39,11 @@ def read_text(path: Path, what: str, error: type[CogArchError], *, limit: int = 
 
     Only plain files of at most `limit` bytes are opened: a pipe or a device might never end.
     """
-    if not path.exists():
+    try:
+        there = path.exists()
+    except OSError as problem:  # a name that is too long, or a folder that may not be looked into
+        raise error(f"cannot read the {what} '{one_line(path)}': {one_line(problem.strerror)}") from None
+    if not there:
         raise error(f"no {what} at '{one_line(path)}'")
     if not path.is_file():
         raise error(f"'{one_line(path)}' is not a file; a {what} is needed")
@@ -48,7 +52,7 @@ def read_text(path: Path, what: str, error: type[CogArchError], *, limit: int = 
             data = file.read(limit + 1)
         if len(data) > limit:
             raise error(f"'{one_line(path)}' is too large for a {what}: at most {limit} bytes")
-        return data.decode("utf-8")
+        return data.decode("utf-8-sig")
     except UnicodeDecodeError as problem:
         line = data.count(b"\n", 0, problem.start) + 1
         raise error(f"{one_line(path, 200)}, line {line}: cannot read the {what}: no UTF-8 text") from None

@@ -18,6 +18,20 @@ from cognitive_arch.errors import CogArchError, ConfigError, PlanningError, Rule
 ROOT = Path(__file__).resolve().parents[1]
 BLOCKS = Path(__file__).parent / "data" / "libprada" / "blocks"
 FULL = "on(Ham,Bun-bottom), on(Bun-top,Ham)"
+BAD_PLANNERS = """
+class Raises:
+    name = "raises"
+
+    def plan(self, *problem):
+        raise ValueError("boom")
+
+
+class ReturnsNone:
+    name = "returns_none"
+
+    def plan(self, *problem):
+        return None
+"""
 FIELDS = {"planner", "status", "action", "plan", "value", "horizon", "samples", "n_rules", "n_atoms"}
 
 
@@ -90,6 +104,9 @@ def test_given_actions_are_evaluated() -> None:
         (RuleError, {"goal": "on(Ham,Bun)"}, "did you mean Bun-top"),
         (RuleError, {"goal": "on(Ham)"}, "on takes 2 arguments, here it has 1"),
         (RuleError, {"goal": "under(Ham,Bun-top)"}, "unknown predicate 'under'"),
+        (RuleError, {"goal": "on(Ham,Bun-top), not on(Ham,Bun-top)"}, "both true and false"),
+        (RuleError, {"goal": "x" * 6000}, "cannot read 'xxx"),
+        (ConfigError, {"horizon": 1000, "samples": 10_000_000}, "valid with horizon 1000: 1 to 20000"),
         (ConfigError, {"horizon": 0}, "horizon 0 is out of range"),
         (ConfigError, {"samples": 0}, "samples 0 is out of range"),
         (ConfigError, {"repeat": 0}, "repeat 0 is out of range"),
@@ -154,6 +171,23 @@ def test_noise_is_refused_quickly(tmp_path: Path) -> None:
     assert len(done.stderr.strip().splitlines()) == 1
 
 
+def test_a_goal_that_holds_is_no_failure() -> None:
+    done = cogarch("plan", "--goal", "isClear(LeftHand)")
+    assert done.returncode == 0
+    assert "the goal holds already" in done.stdout
+
+
+def test_the_hand_that_can_do_it_is_planned_for() -> None:
+    task = dry_run.scene_task("complex", None, "grasp the rake")
+    assert "inHand(Rake,RightHand)" in map(str, task.goal)
+
+
+def test_libprada_rules_without_symbols_are_recognised() -> None:
+    done = cogarch("plan", "--goal", FULL, "--rules", str(BLOCKS / "rules.dat"))
+    assert done.returncode == 2
+    assert "looks like libPRADA's: give its --symbols file, too" in done.stderr
+
+
 def test_options_that_do_not_go_together() -> None:
     done = cogarch("plan", "--symbols", str(BLOCKS / "symbols.dat"))
     assert (done.returncode, done.stdout) == (2, "")
@@ -169,6 +203,7 @@ def third_party(tmp_path: Path) -> Path:
     text = (ROOT / "docs" / "planning.md").read_text()
     code = next(block for block in re.findall(r"```python\n(.*?)```", text, re.S) if "class Greedy" in block)
     (tmp_path / "my_package.py").write_text(code)
+    (tmp_path / "bad_planners.py").write_text(BAD_PLANNERS)
     info = tmp_path / "my_package-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: my-package\nVersion: 1.0\n")
@@ -176,6 +211,7 @@ def third_party(tmp_path: Path) -> Path:
     assert entry is not None
     (info / "entry_points.txt").write_text(
         f"[{entry[1]}]\n{entry[2]} = {entry[3]}\nbroken = no_such_module:Planner\n"
+        "raises = bad_planners:Raises\nreturns_none = bad_planners:ReturnsNone\n"
     )
     return tmp_path
 
@@ -194,4 +230,9 @@ def test_other_packages_add_planners(third_party: Path) -> None:
     assert "did you mean greedy?" in unknown.stderr
     broken = cogarch("plan", *goal, "--planner", "broken", PYTHONPATH=str(third_party))
     assert broken.returncode == 2
-    assert "'broken' (no_such_module:Planner) cannot be loaded" in broken.stderr
+    assert "the planner 'broken' cannot be made: ModuleNotFoundError" in broken.stderr
+    for name, says in (("raises", "failed: ValueError: boom"), ("returns_none", "must return a PlanResult")):
+        bad = cogarch("plan", *goal, "--planner", name, PYTHONPATH=str(third_party))
+        assert (bad.returncode, bad.stdout) == (2, "")
+        assert says in bad.stderr
+        assert len(bad.stderr.strip().splitlines()) == 1

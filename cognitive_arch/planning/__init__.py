@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+import numba
 
+from cognitive_arch.planning.kernel_cache import kernel_folder
 
-def _drop_stale_kernels() -> None:
-    """Delete compiled kernels that are older than any source beside them.
-
-    numba looks only at the file a kernel stands in; it does not see that another one, which the kernel
-    calls, has changed since.
-    """
-    here = Path(__file__).parent
-    changed = max(source.stat().st_mtime for source in here.glob("*.py"))
-    for index in (here / "__pycache__").glob("*.nbi"):
-        try:
-            if index.stat().st_mtime < changed:
-                index.unlink()
-        except OSError:
-            continue  # another process was quicker, or it is not ours to delete
-
-
-_drop_stale_kernels()
+# numba reads the setting when it meets a kernel, so the modules that hold kernels are imported right here,
+# and other packages' kernels keep their own places.
+_elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(kernel_folder())
+try:
+    from cognitive_arch.planning import evaluation, guidance, sampling, sparse_sampling, uct  # noqa: F401
+finally:
+    numba.config.CACHE_DIR = _elsewhere

@@ -25,7 +25,7 @@ class PlanStatus(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class PlanResult:
-    """The best sequence found.
+    """The best sequence found; it may hold `DO_NOTHING`, but not at its end.
 
     `value` is the discounted sum of goal probabilities over steps 0..horizon, `goal_probability` the
     highest probability of the goal along the sequence, both as the planner estimates them. Without a plan
@@ -99,6 +99,9 @@ def check_problem(goal: Goal, horizon: int) -> None:
         raise PlanningError(f"the horizon is {horizon}; valid: 1 or more")
     if not goal:
         raise PlanningError("the goal is empty; a goal has at least one literal")
+    for literal in goal:
+        if literal.negated() in goal:
+            raise PlanningError(f"the goal contradicts itself: it asks for {literal.atom} both ways")
 
 
 def named_actions(problem: Problem, sequence: Sequence[int]) -> tuple[GroundAction, ...]:

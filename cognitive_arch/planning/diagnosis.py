@@ -38,9 +38,8 @@ class Verdict(StrEnum):
 
 
 class LiteralStatus(StrEnum):
-    """How a literal stands."""
+    """How a literal stands that does not hold."""
 
-    HOLDS = "holds"
     REACHABLE = "reachable"
     BLOCKED = "blocked"  # rules would make it true, but none of them can ever apply
     NO_RULE = "no_rule"  # no rule makes it true
@@ -65,13 +64,12 @@ class LiteralDiagnosis:
         unmet = ", ".join(map(str, self.unmet))
         if self.status is LiteralStatus.NO_RULE:
             return f"{self.literal} (no rule makes it true with what is here)"
-        if self.action is None:
-            return f"{self.literal} (it follows from {unmet})"
+        way = f"{self.action} would do it" if self.action else "it follows from other literals"
         if self.status is LiteralStatus.REACHABLE:
-            return f"{self.literal} ({self.action} would do it{f', but needs {unmet}' if unmet else ''})"
+            return f"{self.literal} ({way}{f', but needs {unmet}' if unmet else ''})"
         deeper = [str(root) for root in self.roots if root not in self.unmet]
         because = f"; that fails for want of {', '.join(deeper)}" if deeper else ""
-        return f"{self.literal} ({self.action} would do it, but cannot get {unmet}{because})"
+        return f"{self.literal} ({way}, but cannot get {unmet}{because})"
 
     def to_json(self) -> dict[str, Any]:
         """Plain data, literals written out."""

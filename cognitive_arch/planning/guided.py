@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from cognitive_arch.errors import PlanningError
 from cognitive_arch.planning.base import PlanResult
 from cognitive_arch.planning.evaluation import evaluate_by_sampling
 from cognitive_arch.planning.guidance import Guidance, make_guidance
@@ -49,6 +50,13 @@ class GuidedPrada(APrada):
     gain: float = 0.01
     share: float = 0.75
     name: str = "guided-prada"
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.first_round < 1:
+            raise PlanningError(f"a first round of {self.first_round} samples is too small; valid: 1 or more")
+        if not 0 <= self.share < 1:
+            raise PlanningError(f"the share {self.share:g} is out of range; valid: 0 to less than 1")
 
     def solve(self, problem: Problem, horizon: int, rng: np.random.Generator) -> PlanResult:
         """See `ArrayPlanner.solve`."""

@@ -25,6 +25,9 @@ from cognitive_arch.planning.sampling import sample_sequences
 Sequence = NDArray[np.int32]  # (horizon,) numbers of actions
 Samples = tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64]]
 
+CHUNK = 400_000
+"""Actions sampled at one go: in between, Ctrl-C is heard."""
+
 PARALLEL_FROM = 2000 * 1000
 """Samples times rules from which on a second thread pays (a call then takes more than 10 ms)."""
 
@@ -76,15 +79,23 @@ class Prada(ArrayPlanner):
         draws: NDArray[np.float64],
     ) -> Samples:
         """`sample` one sequence per column of `draws` (horizon, n_samples), by as many threads as pay."""
-        n_samples = draws.shape[1]
+        horizon, n_samples = draws.shape
         workers = self.workers
         if workers is None:
             workers = (os.cpu_count() or 1) if n_samples * len(problem.rules) >= PARALLEL_FROM else 1
-        if workers == 1 or n_samples == 1:
+        n_parts = min(n_samples, max(workers, horizon * n_samples // CHUNK))
+        if n_parts == 1:
             return sample(problem, draws)
-        parts = [np.ascontiguousarray(p) for p in np.array_split(draws, min(workers, n_samples), axis=1)]
-        with ThreadPoolExecutor(len(parts)) as pool:
-            sequences, values, peaks = zip(*pool.map(partial(sample, problem), parts), strict=True)
+        parts = [np.ascontiguousarray(part) for part in np.array_split(draws, n_parts, axis=1)]
+        if workers == 1:
+            done = [sample(problem, part) for part in parts]
+        else:
+            pool = ThreadPoolExecutor(workers)
+            try:
+                done = list(pool.map(partial(sample, problem), parts))
+            finally:
+                pool.shutdown(cancel_futures=True)
+        sequences, values, peaks = zip(*done, strict=True)
         return np.concatenate(sequences, axis=1), np.concatenate(values), np.concatenate(peaks)
 
     def _result(self, problem: Problem, sequence: Sequence | None, horizon: int) -> PlanResult:

@@ -6,17 +6,23 @@ A package adds a planner through the entry point group `cognitive_arch.planners`
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from functools import partial
 from importlib.metadata import entry_points
 from inspect import signature
 
-from cognitive_arch.errors import PlanningError, one_line, unknown
-from cognitive_arch.planning.base import Planner
+import numpy as np
+
+from cognitive_arch.errors import CogArchError, PlanningError, one_line, unknown
+from cognitive_arch.planning.base import Planner, PlanResult
 from cognitive_arch.planning.guided import GuidedPrada
 from cognitive_arch.planning.prada import APrada, Prada
 from cognitive_arch.planning.sparse_sampling import SparseSampling
 from cognitive_arch.planning.uct import Uct
+from cognitive_arch.relational.rules import GroundRule
+from cognitive_arch.relational.symbols import Goal, GroundAction, State
 
 PLANNERS: Mapping[str, Callable[[], Planner]] = {
     "a-prada": APrada,
@@ -25,7 +31,7 @@ PLANNERS: Mapping[str, Callable[[], Planner]] = {
     "sst": SparseSampling,
     "uct": Uct,
 }
-"""Our own planners: name -> constructor with default settings."""
+"""Our own planners: name -> constructor with default settings. Other packages cannot take these names."""
 
 DEFAULT_PLANNER = "guided-prada"
 
@@ -42,21 +48,53 @@ def make_planner(name: str, samples: int | None = None) -> Planner:
 
     Raises `PlanningError` listing the known ones, or saying why one of another package cannot be used.
     """
-    make = PLANNERS.get(name) or _added(name)
-    if samples is not None and "samples" in signature(make).parameters:
-        planner: Planner = partial(make, **{"samples": samples})()
-        return planner
-    return make()
-
-
-def _added(name: str) -> Callable[[], Planner]:
-    """The constructor of a planner that another package brings."""
+    if name in PLANNERS:
+        return _make(PLANNERS[name], samples)
     for entry in entry_points(group=GROUP, name=name):
-        try:
-            made: Callable[[], Planner] = entry.load()
-        except Exception as problem:  # whatever a package of others raises while it is imported
-            raise PlanningError(
-                f"the planner '{name}' ({entry.value}) cannot be loaded: {one_line(problem, 200)}"
-            ) from None
-        return made
+        with _blamed(name, "cannot be made"):
+            return _Added(name, _make(entry.load(), samples))
     raise PlanningError(unknown("planner", name, planner_names()))
+
+
+def _make(make: Callable[[], Planner], samples: int | None) -> Planner:
+    if samples is None or "samples" not in signature(make).parameters:
+        return make()
+    planner: Planner = partial(make, **{"samples": samples})()
+    return planner
+
+
+@contextmanager
+def _blamed(name: str, what: str) -> Iterator[None]:
+    """Tell whatever a planner of another package raises as one line that names it."""
+    try:
+        yield
+    except CogArchError:
+        raise
+    except Exception as problem:
+        kind = type(problem).__name__
+        raise PlanningError(f"the planner '{name}' {what}: {kind}: {one_line(problem, 200)}") from problem
+
+
+@dataclass(frozen=True)
+class _Added:
+    """A planner of another package, whose mistakes are told as such."""
+
+    name: str
+    planner: Planner
+
+    def plan(
+        self,
+        state: State,
+        goal: Goal,
+        rules: Sequence[GroundRule],
+        horizon: int,
+        rng: np.random.Generator,
+    ) -> PlanResult:
+        """See `Planner.plan`."""
+        with _blamed(self.name, "failed"):
+            result = self.planner.plan(state, goal, rules, horizon, rng)
+            if not isinstance(result, PlanResult):
+                raise TypeError(f"plan() must return a PlanResult, not {type(result).__name__}")
+            if not all(isinstance(action, GroundAction) for action in result.actions):
+                raise TypeError("the actions of a PlanResult must be GroundActions")
+            return result

@@ -22,7 +22,11 @@ class Atom(NamedTuple):
     args: tuple[str, ...]
 
     def __str__(self) -> str:
-        return f"{self.predicate}({','.join(self.args)})"
+        """`on(Ham,Bun-bottom)`; a compared count, whose predicate is `height>=2`, as `height(Ham)>=2`."""
+        name = self.predicate.rstrip("0123456789").rstrip("<>=") if self.predicate[-1:].isdigit() else ""
+        if not name or self.predicate[len(name)] not in "<>=":
+            name = self.predicate
+        return f"{name}({','.join(self.args)}){self.predicate[len(name) :]}"
 
 
 class Literal(NamedTuple):

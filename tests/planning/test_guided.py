@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from cognitive_arch.planning import kernels
 from cognitive_arch.planning.base import PlanStatus
+from cognitive_arch.planning.evaluation import evaluate
 from cognitive_arch.planning.guidance import make_guidance
 from cognitive_arch.planning.guided import GuidedPrada
 from cognitive_arch.planning.prada import APrada, Prada
@@ -79,13 +80,18 @@ def test_guided_values_are_those_of_prada(case: Case, seed: int) -> None:
 
 
 @settings(max_examples=60, deadline=None)
-@given(problems(), st.integers(0, 2**32))
+@given(st.booleans().flatmap(lambda derived: problems(derived=derived)), st.integers(0, 2**32))
 def test_no_plan_is_missed_that_plain_sampling_finds(case: Case, seed: int) -> None:
-    """Small problems, where plain sampling sees nearly every sequence."""
+    """Small problems, where plain sampling sees nearly every sequence; what PRADA imagines does not count."""
     rng = np.random.default_rng(seed)
-    plain = APrada(samples=300).plan(*case, 3, rng)
-    guided = GuidedPrada(samples=2000).plan(*case, 3, rng)
-    assert guided.status == plain.status
+    problem = compile_problem(*case)
+    plain = APrada(samples=300).solve(problem, 3, rng)
+    guided = GuidedPrada(samples=2000).solve(problem, 3, rng)
+    if guided.status is not plain.status:
+        better = plain if plain.status is PlanStatus.PLAN else guided
+        truth = evaluate(problem, better.actions, rng)
+        illusion = truth.peak <= truth.steps[0] + 0.05
+        assert illusion if better is plain else not illusion
 
 
 def test_rules_that_lead_nowhere_are_left_out(ground: tuple[GroundRule, ...], start: State) -> None:

@@ -3,16 +3,12 @@
 from __future__ import annotations
 
 import os
-import runpy
-import shutil
-import time
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from cognitive_arch import planning
-from cognitive_arch.planning import kernels
+from cognitive_arch.planning import kernel_cache, kernels
 from cognitive_arch.planning.prada import APrada, Prada
 from cognitive_arch.planning.problem import compile_problem
 from cognitive_arch.planning.sampling import sample_sequences
@@ -178,18 +174,30 @@ def test_many_certain_links_do_not_take_for_ever() -> None:
     assert 0.4 < peak <= 1
 
 
-def test_stale_kernels_are_dropped(tmp_path: Path) -> None:
-    """A fresh copy of the package notices that a kernel is older than one of the modules it calls."""
+def test_kernels_of_other_sources_lie_elsewhere(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     package = tmp_path / "planning"
-    (package / "__pycache__").mkdir(parents=True)
-    shutil.copy(planning.__file__, package / "__init__.py")
-    (package / "kernels.py").write_text("")
-    old, new = package / "__pycache__" / "old.nbi", package / "__pycache__" / "new.nbi"
-    for path in (old, new):
-        path.write_text("")
-    os.utime(old, (1, 1))
-    later = time.time() + 10
-    os.utime(new, (later, later))
-    runpy.run_path(str(package / "__init__.py"))
-    assert not old.exists()
-    assert new.exists()
+    package.mkdir()
+    (package / "kernels.py").write_text("a = 1")
+    monkeypatch.setattr(kernel_cache, "__file__", str(package / "kernel_cache.py"))
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
+    first = kernel_cache.kernel_folder()
+    assert first == kernel_cache.kernel_folder()
+    assert first.parent == tmp_path / "cache"
+    (package / "kernels.py").write_text("a = 2")
+    second = kernel_cache.kernel_folder()
+    assert second != first
+    os.utime(first, (1, 1))
+    assert kernel_cache.kernel_folder() == second
+    assert not first.exists()
+
+
+def test_kernels_find_a_place_where_nothing_can_be_written(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    nowhere = tmp_path / "file"
+    nowhere.write_text("not a folder")
+    monkeypatch.setenv("NUMBA_CACHE_DIR", str(nowhere))
+    monkeypatch.setenv("XDG_CACHE_HOME", str(nowhere))
+    folder = kernel_cache.kernel_folder()
+    assert folder.is_dir()
+    folder.rmdir()

@@ -146,10 +146,10 @@ class _RulesFile:
     def share(self, listed: list[float], noise: float | None, line: Line) -> float:
         """By what the probabilities of the listed outcomes are multiplied: 1, but for rounded ones."""
         total = math.fsum(listed)
-        missing = 0.0 if noise is None else 1 - total - noise
-        if abs(missing) > _TOLERANCE + _ROUNDING or total > 1 + _TOLERANCE + _ROUNDING:
-            sum_ = total + (noise or 0.0)
-            raise self.fail(line, f"the probabilities sum to {sum_:g}; valid: 1, within {_TOLERANCE:g}")
+        sum_ = total + (noise or 0.0)
+        if abs(1 - sum_) > _TOLERANCE + _ROUNDING:
+            hint = f" ({NOISE} has no line here)" if noise is None and total < 1 else ""
+            raise self.fail(line, f"the probabilities sum to {sum_:g}{hint}; valid: 1, within {_TOLERANCE:g}")
         # Three digits need not sum to 1; what was written in full stays as it is, to the last bit.
         target = min(1.0, total) if noise is None else max(0.0, 1.0 - noise)
         return 1.0 if total == 0 or abs(target - total) < _ROUNDING else target / total
