@@ -173,3 +173,13 @@ def test_a_tool_needs_more_room_than_its_middle() -> None:
 )
 def test_what_the_log_says(event: str, changed: tuple[str, ...], says: str) -> None:
     assert told(OutsideEvent.parse(event), changed) == says
+
+
+@pytest.mark.physics
+def test_the_table_is_the_one_in_the_simulator() -> None:
+    from sim.scenario import TABLE_CENTRE_X, TABLE_SIZE
+
+    rim = 0.03
+    half_x, half_y = TABLE_SIZE[0] / 2 - rim, TABLE_SIZE[1] / 2 - rim
+    assert pytest.approx((TABLE_CENTRE_X - half_x, TABLE_CENTRE_X + half_x)) == TABLE_X
+    assert pytest.approx((-half_y, half_y)) == TABLE_Y
