@@ -34,15 +34,18 @@ def warm_up(planner: Planner, notify: Callable[[str], None] = lambda text: None)
     timer.daemon = True
     timer.start()
     try:
-        with _interruptible():
+        with _deaf_to_ctrl_c(notify):
             planner.plan(frozenset(), (Literal(done),), (rule,), 2, np.random.default_rng(0))
     finally:
         timer.cancel()
 
 
 @contextmanager
-def _interruptible() -> Iterator[None]:
-    """See to it that Ctrl-C ends as `KeyboardInterrupt`: inside numba it turns into all kinds of errors."""
+def _deaf_to_ctrl_c(notify: Callable[[str], None]) -> Iterator[None]:
+    """Put off the first Ctrl-C until the compiler is done, which may crash if it is torn out of its work.
+
+    The second one ends the process on the spot.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
@@ -51,15 +54,12 @@ def _interruptible() -> Iterator[None]:
     def note(number: int, frame: FrameType | None) -> None:
         nonlocal interrupted
         interrupted = True
-        raise KeyboardInterrupt
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+        notify("stopping when the compiler is done; once more Ctrl-C stops at once ...")
 
     before = signal.signal(signal.SIGINT, note)
     try:
         yield
-    except Exception:
-        if interrupted:
-            raise KeyboardInterrupt from None
-        raise
     finally:
         signal.signal(signal.SIGINT, before)
     if interrupted:

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from cognitive_arch.planning import kernel_cache, kernels
+from cognitive_arch.planning.base import PlanResult
+from cognitive_arch.planning.compilation import warm_up
 from cognitive_arch.planning.prada import APrada, Prada
-from cognitive_arch.planning.problem import compile_problem
+from cognitive_arch.planning.problem import Problem, compile_problem
 from cognitive_arch.planning.sampling import sample_sequences
 from cognitive_arch.relational.derived import Closure
 from cognitive_arch.relational.parser import parse_rules
@@ -201,3 +204,19 @@ def test_kernels_find_a_place_where_nothing_can_be_written(
     folder = kernel_cache.kernel_folder()
     assert folder.is_dir()
     folder.rmdir()
+
+
+def test_ctrl_c_waits_for_the_compiler() -> None:
+    told: list[str] = []
+
+    class Slow(Prada):
+        def solve(self, problem: Problem, horizon: int, rng: np.random.Generator) -> PlanResult:
+            signal.raise_signal(signal.SIGINT)
+            told.append("solved")
+            return super().solve(problem, horizon, rng)
+
+    before = signal.getsignal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        warm_up(Slow(), told.append)
+    assert told == ["stopping when the compiler is done; once more Ctrl-C stops at once ...", "solved"]
+    assert signal.getsignal(signal.SIGINT) is before
