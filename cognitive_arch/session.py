@@ -237,7 +237,9 @@ def run_task(
     try:
         _check_skills(task, config.backend, environment)
         session = Session(config, setting, environment)
+        compiling = time.perf_counter()
         warm_up(make_planner(config.planner), progress.on_notice)
+        started += time.perf_counter() - compiling  # once on a machine, and no part of the run
         with RunStore(store_folder, create=True) as store:
             progress.on_task(task)
             with store.begin(f"{setting.scene.name}-{config.backend}-{config.seed}", manifest) as run:
