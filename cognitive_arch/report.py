@@ -74,7 +74,9 @@ def _brief(sign: str, atoms: Sequence[str]) -> list[str]:
 
 def result_text(result: dict[str, Any]) -> str:
     """How the run ended and where it is kept."""
-    verdict = "done" if result["success"] else f"failed: {result['explanation']}"
+    verdict = "done"
+    if not result["success"]:
+        verdict = "failed: " + result["explanation"].replace("; ", "\n        ")
     lines = [
         verdict,
         f"{result['good']} of {result['total']} actions worked, "

@@ -85,7 +85,7 @@ def test_an_honest_failure_exits_1_and_says_why(cogarch: Any) -> None:
     answer = cogarch("run", SANDWICH, "--backend", "symbolic", "--noise", "1", "--heuristics", "adaptability")
     assert answer.code == 1
     assert (
-        "failed: sub-goal 1 was not reached (no_plan); tried: graspWith(Ham,LeftHand) (0 of 3 worked)"
+        "failed: sub-goal 1 was not reached (no_plan)\n        tried: graspWith(Ham,LeftHand) (0 of 3 worked)"
         in answer.out
     )
     assert "creativity" not in answer.out

@@ -38,6 +38,15 @@ CANDIDATES = 30
 """How many of the best sequences are tried before there is said to be no plan."""
 
 
+NEARLY = 3
+"""How many sequences are improved when none is good enough as it was sampled."""
+
+
+def _value(entry: tuple[float, Sequence]) -> float:
+    """Sort key: the highest value first."""
+    return -entry[0]
+
+
 @dataclass(frozen=True)
 class GuidedPrada(APrada):
     """A-PRADA with guided sampling.
@@ -88,6 +97,7 @@ class GuidedPrada(APrada):
             return guidance.action[choices], values, peaks
 
         found: dict[bytes, tuple[float, Sequence]] = {}
+        nearly: list[tuple[float, Sequence]] = []
         best, drawn = 0.0, 0
         while drawn < self.samples:
             count = min(max(self.first_round, drawn), self.samples - drawn)
@@ -96,11 +106,18 @@ class GuidedPrada(APrada):
             for n in np.flatnonzero(peaks > enough):
                 sequence = np.ascontiguousarray(sequences[:, n])
                 found.setdefault(sequence.tobytes(), (float(values[n]), sequence))
+            for n in np.argsort(-values)[:NEARLY]:
+                nearly.append((float(values[n]), np.ascontiguousarray(sequences[:, n])))
             before, best = best, max((value for value, _ in found.values()), default=0.0)
             if 0 < best < (1 + self.gain) * before:
                 break
-        ranked = sorted(found.values(), key=lambda entry: -entry[0])
-        return [sequence for _, sequence in ranked[:CANDIDATES]]
+        if not found:
+            # Mostly one action that has failed before and has to be tried many times.
+            improved = [
+                self._improve(problem, sequence) for _, sequence in sorted(nearly, key=_value)[:NEARLY]
+            ]
+            return [sequence for sequence in improved if self._evaluate(problem, sequence)[1] > enough]
+        return [sequence for _, sequence in sorted(found.values(), key=_value)[:CANDIDATES]]
 
     def _helps(self, problem: Problem, sequence: Sequence, start: float, rng: np.random.Generator) -> bool:
         """Whether `sequence` raises the goal's probability above `start` by the rules themselves.
