@@ -131,10 +131,14 @@ class Domain(_Frozen):
 
 
 class Placement(_Frozen):
-    """Where an object lies: centre on the table (metres) and yaw (radians)."""
+    """Where an object lies: centre on the table (metres) and yaw (radians).
+
+    `turn` is how far jitter may turn it from there (radians): a tool lies with its handle within reach.
+    """
 
     position: tuple[float, float]
     yaw: float = 0.0
+    turn: Annotated[float, Field(ge=0, le=math.pi)] = math.pi
 
     @field_validator("position")
     @classmethod
@@ -199,7 +203,7 @@ class Scene(_Frozen):
 
 def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str, Placement]:
     """Where the objects of `scene` lie in one episode: moved by up to `amount` metres in x and y and
-    turned by any yaw, no two closer than they may lie; exactly as in the file if `amount` is 0."""
+    turned by up to their `turn`, no two closer than they may lie; exactly as in the file if `amount` is 0."""
     placements = dict(sorted(scene.objects.items()))
     if amount <= 0:
         return placements
@@ -208,7 +212,8 @@ def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str,
         for name, placement in placements.items():
             dx, dy, yaw = rng.uniform(-1, 1, 3)
             x, y = placement.position
-            moved[name] = Placement(position=(x + amount * dx, y + amount * dy), yaw=math.pi * yaw)
+            turned = placement.yaw + placement.turn * yaw
+            moved[name] = Placement(position=(x + amount * dx, y + amount * dy), yaw=turned)
         pairs = itertools.combinations(moved.values(), 2)
         if all(math.dist(a.position, b.position) >= MIN_DISTANCE for a, b in pairs):
             return moved

@@ -17,7 +17,7 @@ PALM_SIGN: dict[str, float] = {"l": -1.0, "r": 1.0}
 """Which way the palm faces along z of the hand frame."""
 
 FINGER_LENGTH = 0.055  # m, from the palm to the tip
-FINGER_WIDTH = 0.030  # m, along x of the hand
+FINGER_WIDTH = 0.042  # m, along x of the hand
 FINGER_THICKNESS = 0.008  # m, along y of the hand
 FINGER_OFFSET = 0.020  # m, of the pads in front of the hand frame
 STROKE = 0.050  # m, travel of one finger from the middle
@@ -25,12 +25,14 @@ FINGER_FORCE = 10.0  # N, at most
 PAD_RADIUS = 0.002  # m, of the small spheres that carry contact
 PAD_STIFFNESS = 5.0e4  # N/m
 FINGER_FRICTION = 1.0
+HANDLE = (0.030, 0.050, 0.080, 0.110)  # m from a tool's end, where it may be held, best first
 
 # Metres above the tip and across the finger. Two columns cradle a round slice: a single middle one would
 # hold it in two points, off which it creeps as soon as it is not met exactly in its diameter. Three rows
-# meet even a slice of 10 mm in two, so that it cannot swing about the line between the fingers.
+# meet even a slice of 10 mm in two, so that it cannot swing about the line between the fingers. The outer
+# columns are for tools, which would else turn in the hand by half a degree per second.
 _PAD_ROWS = (0.0025, 0.0055, 0.0085, 0.016, 0.030, 0.045)
-_PAD_COLUMNS = (-0.010, 0.010)
+_PAD_COLUMNS = (-0.018, -0.010, 0.010, 0.018)
 _RUBBER = "0.13 0.14 0.16 1"
 _METAL = "0.62 0.64 0.68 1"
 

@@ -22,6 +22,8 @@ TORSO_COST, ARM_COST = 2.0, 0.3  # moving the torso moves everything, so arms go
 POSITION_TOLERANCE = 0.001  # m
 HAND_CLEARANCE = 0.06  # m that both wrists keep above the table
 MAX_LEAN = 0.40  # rad that the torso may lean forward; farther, and the head hangs over the table
+APPROACH = 0.09  # m above its target that a hand comes down from
+REACH_MARGIN = 0.008  # m: where a hand only just gets to, it cannot turn as an object asks for
 RESTARTS = 3
 DOWN = np.array([0.0, 0.0, -1.0])
 
@@ -180,13 +182,14 @@ class Kinematics:
         return path
 
     def reaches(self, hand: str, x: float, y: float) -> bool:
-        """Whether `hand` can grasp something on the table at (x, y), metres; remembered per 5 mm."""
+        """Whether `hand` can come down on something on the table at (x, y), metres; remembered per 5 mm."""
         key = (hand, round(x / 0.005), round(y / 0.005))
         if key not in self._reach:
-            place = np.array([key[1] * 0.005, key[2] * 0.005, self._table_height + 0.01])
+            place = np.array([key[1] * 0.005 - REACH_MARGIN, key[2] * 0.005, self._table_height + 0.003])
             target = HandTarget(fingertip(hand), place, palm_axis(hand), DOWN, tilt=0.30)
-            near = self._home
-            self._reach[key] = self.solve(hand, target, near) is not None
+            above = target.at(place + np.array([0.0, 0.0, APPROACH]))
+            start = self.solve(hand, above, self._home)
+            self._reach[key] = start is not None and self.solve(hand, target, start) is not None
         return self._reach[key]
 
 

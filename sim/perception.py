@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
-from sim.hands import SIDES, finger_names
+from sim.hands import HANDLE, SIDES, finger_names
 from sim.kinematics import Kinematics
 from sim.world import World
 
-TOOL_REACH = 0.25  # m that a held tool adds to an arm
+BEYOND = 0.05  # m by which a tool's head must get beyond the middle of an object
 FALLEN = 0.05  # m below the table's top
 
 
@@ -72,6 +74,27 @@ class OraclePerception:
     def _fallen(self, name: str) -> bool:
         return bool(self._world.pose(name).translation()[2] < self._world.scene.table.height - FALLEN)
 
+    def _can_take(self, hand: str, name: str) -> bool:
+        """Whether the hand gets to where the object is held: its middle, or a tool's handle."""
+        shape, X_WO = self._world.domain.objects[name].shape, self._world.pose(name)
+        if shape.type != "tool":
+            x, y, _ = X_WO.translation()
+            return self._kinematics.reaches(hand, float(x), float(y))
+        ends = (1.0,) if shape.bar > 0 else (1.0, -1.0)
+        handles = (X_WO @ np.array([end * (shape.length / 2 - HANDLE[0]), 0.0, 0.0]) for end in ends)
+        return any(self._kinematics.reaches(hand, float(p[0]), float(p[1])) for p in handles)
+
+    def _tool_reaches(self, tool: str, x: float, y: float) -> bool:
+        """Whether some hand gets to where it would hold the tool with its head beyond (x, y), metres."""
+        shape = self._world.domain.objects[tool].shape
+        assert shape.type == "tool"
+        added = shape.length - HANDLE[0] - BEYOND
+        for angle in (-0.4, 0.0, 0.4):
+            place = (x + added * math.cos(angle), y + added * math.sin(angle))
+            if any(self._kinematics.reaches(hand, *place) for hand in HANDS):
+                return True
+        return False
+
     def _see(self, name: str) -> ObjectObservation:
         world = self._world
         X_WO = world.pose(name)
@@ -83,10 +106,8 @@ class OraclePerception:
             if world.domain.objects[t].kind == "tool" and t != name and not self._fallen(t)
         ]
         holder = next((hand for hand in HANDS if self.held(hand) == name), None)
-        hands = [hand for hand in HANDS if holder or self._kinematics.reaches(hand, x, y)]
-        distance = math.hypot(x, y)
-        nearer = (x * (1 - TOOL_REACH / distance), y * (1 - TOOL_REACH / distance))
-        by_tool = tools if hands or any(self._kinematics.reaches(h, *nearer) for h in HANDS) else []
+        hands = [hand for hand in HANDS if holder or self._can_take(hand, name)]
+        by_tool = [tool for tool in tools if hands or self._tool_reaches(tool, x, y)]
         return ObjectObservation(
             name=name,
             kind=spec.kind,

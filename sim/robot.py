@@ -10,11 +10,19 @@ import numpy as np
 from cognitive_arch.domain import Domain, Scene
 from cognitive_arch.world.observation import HANDS
 from sim.hands import SIDES
-from sim.kinematics import DOWN, HandTarget, Kinematics, Vector, finger_directions, fingertip, palm_axis
+from sim.kinematics import (
+    APPROACH,
+    DOWN,
+    HandTarget,
+    Kinematics,
+    Vector,
+    finger_directions,
+    fingertip,
+    palm_axis,
+)
 from sim.perception import OraclePerception
 from sim.world import Joints, World
 
-APPROACH = 0.09  # m above its target that a hand comes down from
 LEVEL, TILTS = 0.03, (0.05, 0.15, 0.30)  # rad
 YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing direction
 CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may be moved meanwhile

@@ -8,6 +8,7 @@ from sim.skills.base import Skill
 from sim.skills.drop import drop
 from sim.skills.grasp import grasp
 from sim.skills.pull import pull
+from sim.skills.push import push
 from sim.skills.put import put_on
 
 
@@ -24,4 +25,5 @@ SKILLS = {
     "putOnWith": SkillEntry(put_on, 2),
     "dropWith": SkillEntry(drop, 1),
     "pull": SkillEntry(pull, 2),
+    "push": SkillEntry(push, 2),
 }

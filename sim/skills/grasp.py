@@ -9,7 +9,7 @@ import numpy as np
 
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
-from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, STROKE
+from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, HANDLE, STROKE
 from sim.kinematics import DOWN, HandTarget, Vector, palm_axis
 from sim.robot import YAWS, Grip, Robot
 from sim.skills.base import release
@@ -20,7 +20,6 @@ TIP_HEIGHT = 0.003  # m of the finger tips above the object's underside
 MARGIN = 0.015  # m between each open finger and the object
 SQUEEZE = 0.010  # m that the closing fingers are commanded into the object
 FIRM_SQUEEZE = 0.025  # m into a tool: enough for all the force the fingers have
-HANDLE = (0.030, 0.050, 0.080, 0.110)  # m from the handle's end at which a tool may be held, best first
 CARRY = {"LeftHand": (-0.24, -0.17), "RightHand": (-0.24, 0.17)}  # m, where a full hand waits
 CARRY_HEIGHT = 0.17  # m above the table
 

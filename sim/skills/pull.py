@@ -17,6 +17,7 @@ from sim.skills.tool import (
     PITCHES,
     HeldTool,
     Sweep,
+    discomfort,
     first_feasible,
     held_tool,
     is_free,
@@ -27,14 +28,13 @@ from sim.skills.tool import (
 
 BEHIND = 0.015  # m between the bar and the object when the tool comes down
 BESIDE = 0.005  # m between the shaft and the object
-CLOSER = 0.10  # m that a pull is to bring an object closer, at least
+CLOSER = 0.115  # m that a pull is to bring an object closer, at least
 ROOM = 0.030  # m around the object where it ends up: fingers must fit in
 ENDS = (  # m, x and y to choose from
-    tuple(round(float(x), 2) for x in np.arange(-0.30, -0.46, -0.03)),
+    tuple(round(float(x), 2) for x in np.arange(-0.30, -0.46, -0.02)),
     tuple(round(float(y), 2) for y in np.arange(-0.21, 0.22, 0.03)),
 )
 SKEWS = (0.0, 0.3, -0.3, 0.55, -0.55)  # rad; friction holds the object on the bar up to about 0.67
-NEAREST = (-0.24, 0.10)  # m, x and |y|: nearer to its own body a hand hardly gets, nor to the other side
 BEST_X = -0.40  # m
 
 
@@ -68,7 +68,7 @@ def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
         if room < ROOM or smallest_gap([Capsule(place, end, body.radius)], low) < 0.005:
             continue
         sweep = _sweep(tool, place, end, body.radius, side, skew)
-        cost = _discomfort(tool, sweep) + 2 * abs(end[0] - BEST_X) + abs(end[1]) + 10 * max(0.0, 0.06 - room)
+        cost = discomfort(tool, sweep) + 2 * abs(end[0] - BEST_X) + abs(end[1]) + 10 * max(0.0, 0.06 - room)
         ranked.append((cost, end, sweep))
     other = next(hand for hand in HANDS if hand != tool.hand)
     for _, end, flat in sorted(ranked, key=lambda row: row[0]):
@@ -78,15 +78,6 @@ def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
             sweep = replace(flat, pitch=pitch)
             if is_free(robot, tool, sweep, others):
                 yield sweep
-
-
-def _discomfort(tool: HeldTool, sweep: Sweep) -> float:
-    """How much the arm has to twist: metres by which the hand ends up too near the body or the other
-    side, weighed with radians by which the shaft points outwards."""
-    sign = -1.0 if tool.hand == "LeftHand" else 1.0
-    x = sweep.end[0] + tool.grip * math.cos(sweep.yaw)
-    y = sign * (sweep.end[1] + tool.grip * math.sin(sweep.yaw))
-    return 5 * (max(0.0, x - NEAREST[0]) + max(0.0, NEAREST[1] - y)) + 0.5 * abs(sign * sweep.yaw - 0.4)
 
 
 def _sweep(tool: HeldTool, place: Point, end: Point, radius: float, side: float, skew: float) -> Sweep:

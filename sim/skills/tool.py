@@ -22,12 +22,15 @@ from sim.world import Joints
 
 FLOAT = 0.002  # m between a sweeping tool and the table
 LIFT = 0.075  # m above that at which a tool travels: over everything but a tall stack
+END_LIFT = 0.045  # m that it is lifted at first where a sweep ends, near the body: over what was pulled
 SPEED = 0.10  # m/s of a sweep
 MARGIN = 0.008  # m that a sweep keeps from what it is not to touch
 OVER = 0.008  # m that a raised shaft passes over it
 LEVEL = 0.03  # rad; at the far end of a shaft this is 6 mm
 YAW_TOLERANCE = 0.03  # rad
 PITCHES = (0.0, 0.08, 0.15)  # rad by which the handle may be higher than the head
+NEAREST = (-0.20, 0.08)  # m, x and |y|: nearer to its own body a hand hardly gets, nor to the other side
+FARTHEST = -0.46  # m: farther away it gets only straight ahead
 PALM_HEIGHT = 0.045  # m above the table: what is taller must not be under the palm
 _SHAFT_PARTS = 6
 _PIECE = 0.03  # m between two waypoints, or two looks at what is in the way
@@ -163,6 +166,18 @@ def obstacles(robot: Robot, *but: str) -> dict[str, tuple[Capsule, ...]]:
     }
 
 
+def discomfort(tool: HeldTool, sweep: Sweep) -> float:
+    """How much the arm has to twist: metres by which the hand ends up too near the body or the other
+    side, weighed with radians by which the shaft points outwards."""
+    sign = -1.0 if tool.hand == "LeftHand" else 1.0
+    cost = 0.5 * abs(sign * sweep.yaw - 0.3)
+    for head in (sweep.start, sweep.end):
+        x = head[0] + tool.grip * math.cos(sweep.yaw)
+        y = sign * (head[1] + tool.grip * math.sin(sweep.yaw))
+        cost += 10 * (max(0.0, x - NEAREST[0]) + max(0.0, NEAREST[1] - y) + max(0.0, FARTHEST - x))
+    return cost
+
+
 def is_free(robot: Robot, tool: HeldTool, sweep: Sweep, others: dict[str, tuple[Capsule, ...]]) -> bool:
     """Whether tool, fingers and palm pass all obstacles on the way, beside them or over them."""
     table = robot.scene.table.height
@@ -212,7 +227,7 @@ def _solve(robot: Robot, tool: HeldTool, sweep: Sweep) -> Motion | None:
     for begin, end, pieces in (
         (at(sweep.start, low + LIFT), at(sweep.start, low), 4),
         (at(sweep.start, low), at(sweep.end, low), max(2, math.ceil(sweep.length / _PIECE))),
-        (at(sweep.end, low), at(sweep.end, low + LIFT), 4),
+        (at(sweep.end, low), at(sweep.end, low + END_LIFT), 3),
     ):
         leg = kinematics.line(hand, begin, end.p_WP, joints, idle=idle, pieces=pieces)
         if leg is None:
@@ -232,7 +247,7 @@ def perform(robot: Robot, tool: HeldTool, motion: Motion) -> FailureReason:
     robot.world.hold(0.1)
     robot.world.follow(motion.along, motion.seconds)
     robot.world.hold(0.1)
-    robot.world.follow(motion.up, 1.0)
+    robot.world.follow(motion.up, 0.8)
     if robot.perception.held(tool.hand) != tool.name:
         return _lost(robot, tool.hand)
     carry_tool(robot, tool.hand, tool.name)

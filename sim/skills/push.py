@@ -1,0 +1,92 @@
+"""push(obj, tool, hand): put a tool's head in front of an object and shove it away from the robot."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+
+from cognitive_arch.execution.environment import FailureReason
+from cognitive_arch.world.observation import HANDS
+from sim.footprint import Capsule, Point, disc, footprint, smallest_gap
+from sim.robot import Robot
+from sim.scenario import TABLE_CENTRE_X, TABLE_SIZE
+from sim.skills.tool import (
+    PITCHES,
+    HeldTool,
+    Sweep,
+    discomfort,
+    first_feasible,
+    held_tool,
+    is_free,
+    obstacles,
+    perform,
+    unusable,
+)
+
+BEFORE = 0.015  # m between the head and the object when the tool comes down
+DISTANCES = (0.12, 0.16, 0.20, 0.24)  # m that an object may be pushed
+COURSES = (0.0, 0.25, -0.25, 0.5, -0.5)  # rad from straight away
+SKEWS = (0.0, 0.2, -0.2, 0.4, -0.4)  # rad of a bar to its course; a tip pushes straight or not at all
+RIM = 0.04  # m that stay between a pushed object and the table's edge
+ROOM = 0.01  # m around the object where it ends up
+
+
+def push(robot: Robot, args: tuple[str, ...]) -> FailureReason:
+    """See `base.Skill`."""
+    obj, name, hand = args
+    reason = unusable(robot, obj, name, hand)
+    if reason is not None:
+        return reason
+    tool = held_tool(robot, name, hand)
+    if tool is None:
+        return FailureReason.NOT_A_TOOL
+    motion = first_feasible(robot, tool, _sweeps(robot, tool, obj))
+    return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
+
+
+def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
+    """Ways to push the object out of reach, or at least farther away, the best first."""
+    x, y, _ = robot.world.pose(obj).translation()
+    place = (float(x), float(y))
+    (body,) = footprint(robot.domain.objects[obj].shape, robot.world.pose(obj))
+    others = obstacles(robot, obj)
+    low = [c for capsules in others.values() for c in capsules]
+    skews = SKEWS if tool.shape.bar > 0 else (0.0,)
+    ranked = []
+    for distance, course, skew in itertools.product(DISTANCES, COURSES, skews):
+        end = (place[0] - distance * math.cos(course), place[1] - distance * math.sin(course))
+        path = Capsule(place, end, body.radius)
+        if not _on_table(end, body.radius) or smallest_gap([path], low) < 0.005:
+            continue
+        if smallest_gap([disc(end, body.radius)], low) < ROOM:
+            continue
+        near = any(robot.kinematics.reaches(hand, *end) for hand in HANDS)
+        sweep = _sweep(tool, place, end, body.radius, skew)
+        cost = discomfort(tool, sweep) + abs(course) + abs(skew) + distance + (1.0 if near else 0.0)
+        ranked.append((cost, sweep))
+    for _, flat in sorted(ranked, key=lambda row: row[0]):
+        for pitch in PITCHES:
+            sweep = replace(flat, pitch=pitch)
+            if is_free(robot, tool, sweep, others):
+                yield sweep
+
+
+def _on_table(place: Point, radius: float) -> bool:
+    inside = radius + RIM
+    return (
+        abs(place[0] - TABLE_CENTRE_X) <= TABLE_SIZE[0] / 2 - inside
+        and abs(place[1]) <= TABLE_SIZE[1] / 2 - inside
+    )
+
+
+def _sweep(tool: HeldTool, place: Point, end: Point, radius: float, skew: float) -> Sweep:
+    """The middle of the head's far face pushes the object from `place` to `end`."""
+    yaw = math.atan2(place[1] - end[1], place[0] - end[0]) + skew
+    ahead = tool.shape.width / 2 + radius
+
+    def head(point: Point, along: float) -> Point:
+        return (point[0] + along * math.cos(yaw), point[1] + along * math.sin(yaw))
+
+    return Sweep(yaw, head(place, ahead + BEFORE), head(end, ahead))

@@ -1,0 +1,94 @@
+"""Tools in the hand: what they cover, why they are refused, and what pulling and pushing does."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from cognitive_arch.domain import Domain, Scene, jittered, load_scene
+from cognitive_arch.execution.environment import FailureReason, Outcome
+from sim.check import mirrored
+from sim.environment import DrakeEnvironment
+from sim.footprint import Capsule, disc, gap, smallest_gap, tool_footprint
+from tests.conftest import action
+
+
+@pytest.fixture(scope="module")
+def scene() -> Scene:
+    return load_scene("complex")
+
+
+@pytest.fixture(scope="module")
+def complex_scene(domain: Domain, scene: Scene) -> DrakeEnvironment:
+    return DrakeEnvironment(domain, scene, jitter=0.02)
+
+
+def test_gaps_between_capsules() -> None:
+    bar = Capsule((-1.0, 0.0), (1.0, 0.0), 0.1)
+    assert gap(bar, disc((0.0, 1.0), 0.2)) == pytest.approx(0.7)
+    assert gap(bar, disc((2.0, 0.0), 0.2)) == pytest.approx(0.7)
+    assert gap(bar, Capsule((0.0, -1.0), (0.0, 1.0), 0.1)) < 0  # crossing, though no end is near
+    assert smallest_gap([bar], []) == 1.0
+
+
+def test_the_bar_of_a_rake_is_at_its_far_end(domain: Domain) -> None:
+    shape = domain.objects["Rake"].shape
+    assert shape.type == "tool"
+    shaft, bar = tool_footprint(shape, (0.0, 0.0), 0.0)
+    assert bar.a[0] == bar.b[0] == pytest.approx(-shape.length / 2 + shape.width / 2)
+    assert abs(bar.a[1] - bar.b[1]) + 2 * bar.radius == pytest.approx(shape.bar)
+    assert gap(shaft, bar) < 0
+    turned = tool_footprint(shape, (0.0, 0.0), math.pi / 2)[1]
+    assert turned.a[1] == pytest.approx(bar.a[0])
+
+
+def test_jitter_turns_a_tool_only_as_far_as_it_may(scene: Scene) -> None:
+    for seed in range(20):
+        placements = jittered(scene, 0.02, np.random.default_rng(seed))
+        assert abs(placements["Rake"].yaw) <= scene.objects["Rake"].turn < 0.3
+
+
+@pytest.mark.parametrize(
+    ("call", "reason"),
+    [
+        ("pull(Ham,Rake,RightHand)", FailureReason.HAND_EMPTY),
+        ("push(Ham,Stick,LeftHand)", FailureReason.HAND_EMPTY),
+        ("pull(Ham,Unicorn,RightHand)", FailureReason.UNKNOWN_OBJECT),
+        ("pull(Rake,Rake,RightHand)", FailureReason.UNKNOWN_OBJECT),
+        ("pull(Ham,RightHand)", FailureReason.UNKNOWN_OBJECT),
+    ],
+)
+def test_refusals(complex_scene: DrakeEnvironment, call: str, reason: FailureReason) -> None:
+    complex_scene.reset(0)
+    assert complex_scene.execute(action(call)).reason is reason
+
+
+@pytest.mark.physics
+def test_what_a_stick_cannot_do(complex_scene: DrakeEnvironment) -> None:
+    complex_scene.reset(0)
+    assert complex_scene.execute(action("graspWith(Stick,LeftHand)")).outcome is Outcome.SUCCESS
+    refused = complex_scene.execute(action("pull(Ham,Stick,LeftHand)"))
+    assert refused.reason is FailureReason.CANNOT_PULL
+    pushed = complex_scene.execute(action("push(Bun-bottom,Stick,LeftHand)"))
+    assert pushed.reason is FailureReason.NONE
+    assert pushed.effect["displacement_x"] < -0.10
+    assert complex_scene.robot.perception.held("LeftHand") == "Stick"
+
+
+@pytest.mark.physics
+@pytest.mark.parametrize("hand", ["LeftHand", "RightHand"])
+def test_pull_brings_it_within_reach_and_keeps_the_tool(domain: Domain, scene: Scene, hand: str) -> None:
+    environment = DrakeEnvironment(domain, mirrored(scene) if hand == "LeftHand" else scene)
+    before = {obj.name: obj for obj in environment.reset(0).objects}
+    assert not set(before["Ham"].reachable_with) & {"LeftHand", "RightHand"}
+    assert environment.execute(action(f"graspWith(Rake,{hand})")).outcome is Outcome.SUCCESS
+    result = environment.execute(action(f"pull(Ham,Rake,{hand})"))
+    assert result.reason is FailureReason.NONE
+    assert result.effect["displacement_x"] > 0.10
+    after = {obj.name: obj for obj in environment.observe().objects}
+    assert {"LeftHand", "RightHand"} & set(after["Ham"].reachable_with)
+    assert environment.robot.perception.held(hand) == "Rake"
+    for name in ("Bun-bottom", "Bun-top", "Stick", "Tomato"):
+        assert math.dist(before[name].position, after[name].position) < 0.005, name
