@@ -29,7 +29,12 @@ app = typer.Typer(
 )
 
 Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else there.")]
-SceneOption = Annotated[str, typer.Option("--scene", help="A scene's name, or the path of a scene file.")]
+SceneOption = Annotated[
+    str,
+    typer.Option(
+        "--scene", help="A scene's name, random:SEED[:DOMAIN[:NUMBER]], or the path of a scene file."
+    ),
+]
 RulesOption = Annotated[
     str | None, typer.Option("--rules", help="A rules file to use instead of the domain's own.")
 ]

@@ -16,7 +16,6 @@ import yaml
 from pydantic import (
     BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     ValidationError,
     field_validator,
@@ -25,65 +24,16 @@ from pydantic import (
 
 from cognitive_arch import resources
 from cognitive_arch.errors import ConfigError, one_line, unknown
+from cognitive_arch.footprint import outer_radius
 from cognitive_arch.outside import Happening, OutsideEvent, check_events
+from cognitive_arch.shapes import Frozen, Shape
 
 MIN_DISTANCE = 0.07  # metres between the centres of two objects that lie side by side
 
-Positive = Annotated[float, Field(gt=0, le=2.0)]
 Name = Annotated[str, Field(pattern=r"^[A-Z][A-Za-z0-9]*(-[A-Za-z0-9]+)*$")]
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Cylinder(_Frozen):
-    """Upright cylinder, metres."""
-
-    type: Literal["cylinder"]
-    radius: Positive
-    height: Positive
-
-
-class Box(_Frozen):
-    """Box with its edges along the axes, metres (x, y, z)."""
-
-    type: Literal["box"]
-    size: tuple[Positive, Positive, Positive]
-
-    @property
-    def height(self) -> float:
-        return self.size[2]
-
-
-class Sphere(_Frozen):
-    """Ball, metres."""
-
-    type: Literal["sphere"]
-    radius: Positive
-
-    @property
-    def height(self) -> float:
-        return 2 * self.radius
-
-
-class ToolShape(_Frozen):
-    """A shaft with an optional cross bar at its far end, metres; `bar` 0 is a plain stick."""
-
-    type: Literal["tool"]
-    length: Positive
-    width: Positive
-    bar: Annotated[float, Field(ge=0, le=1.0)]
-
-    @property
-    def height(self) -> float:
-        return self.width
-
-
-Shape = Annotated[Cylinder | Box | Sphere | ToolShape, Field(discriminator="type")]
-
-
-class ObjectSpec(_Frozen):
+class ObjectSpec(Frozen):
     """A thing the domain knows."""
 
     kind: Literal["object", "tool"] = "object"
@@ -94,7 +44,7 @@ class ObjectSpec(_Frozen):
     can_pull: bool = False
 
 
-class Recipe(_Frozen):
+class Recipe(Frozen):
     """What a thing is made of, from the bottom up; each slot lists what may fill it, best first."""
 
     aliases: tuple[str, ...] = ()
@@ -104,14 +54,14 @@ class Recipe(_Frozen):
     lid: tuple[Name, ...] = ()
 
 
-class Domain(_Frozen):
+class Domain(Frozen):
     """One `domain.yaml`."""
 
     name: str
     title: str
     objects: dict[Name, ObjectSpec]
-    recipes: dict[str, Recipe] = {}
-    capabilities: dict[str, Literal["arm", "pull", "push"]] = {}
+    recipes: dict[str, Recipe] = Field(default_factory=dict)
+    capabilities: dict[str, Literal["arm", "pull", "push"]] = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _recipes_speak_of_known_things(self) -> Domain:
@@ -130,7 +80,7 @@ class Domain(_Frozen):
         return self.folder / "rules.nid"
 
 
-class Placement(_Frozen):
+class Placement(Frozen):
     """Where an object lies: centre on the table (metres) and yaw (radians).
 
     `turn` is how far jitter may turn it from there (radians): a tool lies with its handle within reach.
@@ -148,13 +98,13 @@ class Placement(_Frozen):
         return value
 
 
-class Table(_Frozen):
+class Table(Frozen):
     """The table's top, metres above the root frame's origin."""
 
     height: Annotated[float, Field(ge=-0.3, le=0.1)] = -0.096
 
 
-class ReachLimits(_Frozen):
+class ReachLimits(Frozen):
     """Published reach constants (metres), used where no kinematic model answers.
 
     A place is within reach if x >= `min_x`; y < -`side` only the left arm gets there, y > `side` only
@@ -177,7 +127,7 @@ def event_from_text(value: object) -> OutsideEvent:
         raise ValueError(str(error)) from None
 
 
-class Scene(_Frozen):
+class Scene(Frozen):
     """One `scenes/*.yaml`: which objects lie where when an episode starts, and what happens meanwhile."""
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}$")]
@@ -186,7 +136,9 @@ class Scene(_Frozen):
     table: Table = Table()
     reach: ReachLimits = ReachLimits()
     objects: dict[Name, Placement] = Field(min_length=1)
-    events: tuple[Annotated[OutsideEvent, BeforeValidator(event_from_text)], ...] = Field((), max_length=100)
+    events: tuple[Annotated[OutsideEvent, BeforeValidator(event_from_text)], ...] = Field(
+        default=(), max_length=100
+    )
 
     @property
     def things(self) -> tuple[str, ...]:
@@ -201,12 +153,13 @@ class Scene(_Frozen):
         return scene
 
 
-def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str, Placement]:
+def jittered(scene: Scene, amount: float, rng: np.random.Generator, domain: Domain) -> dict[str, Placement]:
     """Where the objects of `scene` lie in one episode: moved by up to `amount` metres in x and y and
     turned by up to their `turn`, no two closer than they may lie; exactly as in the file if `amount` is 0."""
     placements = dict(sorted(scene.objects.items()))
     if amount <= 0:
         return placements
+    radii = {name: _radius(domain.objects[name].shape) for name in placements}
     for _ in range(200):
         moved = {}
         for name, placement in placements.items():
@@ -214,10 +167,18 @@ def jittered(scene: Scene, amount: float, rng: np.random.Generator) -> dict[str,
             x, y = placement.position
             turned = placement.yaw + placement.turn * yaw
             moved[name] = Placement(position=(x + amount * dx, y + amount * dy), yaw=turned)
-        pairs = itertools.combinations(moved.values(), 2)
-        if all(math.dist(a.position, b.position) >= MIN_DISTANCE for a, b in pairs):
+        pairs = itertools.combinations(moved, 2)
+        if all(
+            math.dist(moved[a].position, moved[b].position) >= max(MIN_DISTANCE, radii[a] + radii[b] + 0.01)
+            for a, b in pairs
+        ):
             return moved
     raise ConfigError(f"objects of scene {scene.name} cannot be moved by {amount:g} m without overlap")
+
+
+def _radius(shape: Shape) -> float:
+    """Metres about its middle that a thing needs, whichever way it is turned; tools lie among the others."""
+    return 0.0 if shape.type == "tool" else outer_radius(shape)
 
 
 def read_yaml(path: Path, what: str) -> Any:
@@ -268,18 +229,25 @@ def scene_paths() -> dict[str, Path]:
 
 
 def load_scene(name_or_path: str) -> Scene:
-    """Read a scene by its name or from a file (anything with a slash or ending in .yaml).
+    """Read a scene by its name or from a file (anything with a slash or ending in .yaml), or make the
+    one that `random:SEED` stands for (see `random_scenes`).
 
     Raises `ConfigError` if there is none, or it is malformed, or speaks of objects its domain does not
     know.
     """
+    from cognitive_arch import random_scenes  # which is built on this module
+
+    if random_scenes.is_random(name_or_path):
+        return random_scenes.scene_from_name(name_or_path)
     known = scene_paths()
     if name_or_path in known:
         path = known[name_or_path]
     elif name_or_path.endswith((".yaml", ".yml")) or "/" in name_or_path:
         path = Path(name_or_path)
     else:
-        raise ConfigError(unknown("scene", name_or_path, known) + ", or the path of a .yaml file")
+        raise ConfigError(
+            unknown("scene", name_or_path, known) + f", {random_scenes.FORM}, or the path of a .yaml file"
+        )
     try:
         scene = Scene.model_validate(read_yaml(path, "scene"))
     except ValidationError as error:

@@ -60,7 +60,7 @@ class DrakeEnvironment:
     def reset(self, seed: int) -> Observation:
         """See `Environment.reset`."""
         rng = np.random.default_rng(seed)
-        self.world.reset(jittered(self._scene, self._jitter, rng))
+        self.world.reset(jittered(self._scene, self._jitter, rng, self._domain))
         self._robot = Robot(self._domain, self._scene, self.world, self._noise, rng)
         if self._photographer:
             self._photographer.start()

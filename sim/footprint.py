@@ -1,87 +1,17 @@
-"""What objects, tools and fingers cover of the table: capsules in the plane, and the gaps between them."""
+"""What objects, tools and fingers cover of the table, by their poses in the simulator."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterable
-from dataclasses import dataclass
-
 from pydrake.math import RigidTransform
 
-from cognitive_arch import domain as dom
+from cognitive_arch import footprint as flat
+from cognitive_arch.footprint import Capsule, Point, disc, gap, outer_radius, smallest_gap, tool_footprint
+from cognitive_arch.shapes import Shape
 
-Point = tuple[float, float]
-
-
-@dataclass(frozen=True)
-class Capsule:
-    """All points within `radius` of the segment from `a` to `b`, metres."""
-
-    a: Point
-    b: Point
-    radius: float
-
-    def moved(self, dx: float, dy: float) -> Capsule:
-        """The capsule elsewhere, metres."""
-        return Capsule((self.a[0] + dx, self.a[1] + dy), (self.b[0] + dx, self.b[1] + dy), self.radius)
+__all__ = ["Capsule", "Point", "disc", "footprint", "gap", "outer_radius", "smallest_gap", "tool_footprint"]
 
 
-def disc(centre: Point, radius: float) -> Capsule:
-    """A capsule of no length."""
-    return Capsule(centre, centre, radius)
-
-
-def gap(first: Capsule, second: Capsule) -> float:
-    """Free space between two capsules, metres; negative where they overlap."""
-    return _distance(first, second) - first.radius - second.radius
-
-
-def smallest_gap(some: Iterable[Capsule], others: Iterable[Capsule], default: float = 1.0) -> float:
-    """The smallest gap between capsules of two groups, metres."""
-    others = tuple(others)
-    return min((gap(a, b) for a in some for b in others), default=default)
-
-
-def footprint(shape: dom.Shape, X_WO: RigidTransform) -> tuple[Capsule, ...]:
+def footprint(shape: Shape, X_WO: RigidTransform) -> tuple[Capsule, ...]:
     """What an object that lies flat at `X_WO` covers."""
     x, y, _ = X_WO.translation()
-    centre = (float(x), float(y))
-    if isinstance(shape, dom.ToolShape):
-        return tool_footprint(shape, centre, float(X_WO.rotation().ToRollPitchYaw().yaw_angle()))
-    if isinstance(shape, dom.Box):
-        return (disc(centre, math.hypot(*shape.size[:2]) / 2),)
-    return (disc(centre, shape.radius),)
-
-
-def tool_footprint(shape: dom.ToolShape, centre: Point, yaw: float) -> tuple[Capsule, ...]:
-    """What a level tool with its shaft's middle at `centre` (metres) and this yaw (radians) covers."""
-    cos, sin = math.cos(yaw), math.sin(yaw)
-
-    def at(along: float, across: float) -> Point:
-        return (centre[0] + along * cos - across * sin, centre[1] + along * sin + across * cos)
-
-    half, width = shape.length / 2, shape.width / 2
-    shaft = Capsule(at(width - half, 0.0), at(half - width, 0.0), width)
-    if shape.bar <= 0:
-        return (shaft,)
-    side = shape.bar / 2 - width
-    return (shaft, Capsule(at(width - half, -side), at(width - half, side), width))
-
-
-def _distance(first: Capsule, second: Capsule) -> float:
-    a, b, c, d = first.a, first.b, second.a, second.b
-    if _turn(a, b, c) * _turn(a, b, d) < 0 and _turn(c, d, a) * _turn(c, d, b) < 0:
-        return 0.0
-    return min(_to_segment(a, c, d), _to_segment(b, c, d), _to_segment(c, a, b), _to_segment(d, a, b))
-
-
-def _turn(a: Point, b: Point, c: Point) -> float:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
-
-
-def _to_segment(p: Point, a: Point, b: Point) -> float:
-    dx, dy = b[0] - a[0], b[1] - a[1]
-    square = dx * dx + dy * dy
-    along = 0.0 if square <= 0 else ((p[0] - a[0]) * dx + (p[1] - a[1]) * dy) / square
-    along = min(1.0, max(0.0, along))
-    return math.hypot(p[0] - a[0] - along * dx, p[1] - a[1] - along * dy)
+    return flat.footprint(shape, (float(x), float(y)), float(X_WO.rotation().ToRollPitchYaw().yaw_angle()))

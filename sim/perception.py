@@ -67,9 +67,7 @@ class OraclePerception:
     def radius(self, name: str) -> float:
         """Half the smaller horizontal extent of an object, metres."""
         shape = self._world.domain.objects[name].shape
-        if shape.type == "box":
-            return min(shape.size[:2]) / 2
-        return shape.width / 2 if shape.type == "tool" else shape.radius
+        return shape.width / 2 if shape.type == "tool" else min(shape.extent) / 2
 
     def _fallen(self, name: str) -> bool:
         return bool(self._world.pose(name).translation()[2] < self._world.scene.table.height - FALLEN)

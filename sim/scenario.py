@@ -8,13 +8,14 @@ sinking into a round one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.geometry import (
     AddContactMaterial,
     Box,
+    CalcVolume,
     CollisionFilterDeclaration,
     Cylinder,
     GeometrySet,
@@ -39,9 +40,9 @@ from pydrake.multibody.tree import (
     SpatialInertia,
     UnitInertia,
 )
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 
-from cognitive_arch import domain as dom
+from cognitive_arch import shapes
 from cognitive_arch.domain import Domain, ObjectSpec, Scene
 from sim.assets import robot_urdf
 from sim.hands import PAD_RADIUS, PAD_STIFFNESS
@@ -51,6 +52,7 @@ TABLE_SIZE = (0.70, 0.90, 0.04)  # m
 TABLE_CENTRE_X = -0.50  # m
 FRICTION = 0.8
 DISSIPATION = 1.0  # s/m, of the contact model
+ROLLING_TIME = 0.15  # s in which what rolls loses 63 % of its speed
 GAINS: Mapping[str, tuple[float, float]] = {  # N m/rad and N m s/rad; N/m and N s/m for the fingers
     "torso": (3000.0, 150.0),
     "shoulder": (1500.0, 60.0),
@@ -125,85 +127,139 @@ def _add_table(plant: MultibodyPlant, height: float, friction: float) -> RigidBo
     return table
 
 
-def drake_shape(shape: dom.Cylinder | dom.Box | dom.Sphere) -> Shape:
+def drake_shape(shape: shapes.Cylinder | shapes.Box | shapes.Sphere) -> Shape:
     """Drake's shape for one of ours."""
-    if isinstance(shape, dom.Cylinder):
+    if isinstance(shape, shapes.Cylinder):
         return Cylinder(shape.radius, shape.height)
-    if isinstance(shape, dom.Box):
+    if isinstance(shape, shapes.Box):
         return Box(*shape.size)
     return Sphere(shape.radius)
 
 
-def tool_parts(tool: dom.ToolShape) -> Iterator[tuple[str, RigidTransform, dom.Box]]:
-    """Shaft and cross bar of a tool in its body frame: origin mid-shaft, x along it, the bar at -x."""
-    width = tool.width
-    yield "shaft", RigidTransform(), dom.Box(type="box", size=(tool.length, width, width))
-    if tool.bar > 0:
-        X_OB = RigidTransform([-tool.length / 2 + width / 2, 0, 0])
-        yield "bar", X_OB, dom.Box(type="box", size=(width, tool.bar, width))
+@dataclass(frozen=True)
+class SolidPart:
+    """A solid of a thing, in its body frame O; the lowest ones are those that it may stand on."""
+
+    label: str
+    X_OP: RigidTransform
+    solid: shapes.Cylinder | shapes.Box | shapes.Sphere
+    lowest: bool = True
+
+    @property
+    def volume(self) -> float:
+        """Cubic metres."""
+        return float(CalcVolume(drake_shape(self.solid)))
+
+
+def solid_parts(shape: shapes.Shape) -> list[SolidPart]:
+    """What a thing is made of; a tool's x axis runs along its shaft from the bar at -x to the handle."""
+    if isinstance(shape, shapes.ToolShape):
+        width = shape.width
+        parts = [SolidPart("shaft", RigidTransform(), _box(shape.length, width, width))]
+        if shape.bar > 0:
+            X_OB = RigidTransform([-shape.length / 2 + width / 2, 0, 0])
+            parts.append(SolidPart("bar", X_OB, _box(width, shape.bar, width)))
+        return parts
+    if not isinstance(shape, shapes.Compound):
+        return [SolidPart("body", RigidTransform(), shape)]
+    return [
+        SolidPart(
+            f"part_{n}",
+            RigidTransform([*part.place, part.above + part.solid.height / 2 - shape.height / 2]),
+            part.solid,
+            part.above == 0,
+        )
+        for n, part in enumerate(shape.parts)
+    ]
+
+
+def _box(x: float, y: float, z: float) -> shapes.Box:
+    return shapes.Box(type="box", size=(x, y, z))
+
+
+def _unit_inertia(solid: shapes.Cylinder | shapes.Box | shapes.Sphere) -> UnitInertia:
+    if isinstance(solid, shapes.Cylinder):
+        return UnitInertia.SolidCylinder(solid.radius, solid.height, [0, 0, 1])
+    if isinstance(solid, shapes.Box):
+        return UnitInertia.SolidBox(*solid.size)
+    return UnitInertia.SolidSphere(solid.radius)
 
 
 def object_inertia(spec: ObjectSpec) -> SpatialInertia:
-    """Inertia of a solid of uniform density (kg, m), about the body origin."""
-    shape = spec.shape
-    if isinstance(shape, dom.ToolShape):
-        parts = [(X_OP.translation(), part.size) for _, X_OP, part in tool_parts(shape)]
-        volumes = [float(np.prod(size)) for _, size in parts]
-        total = SpatialInertia.Zero()
-        for (p_OP, size), volume in zip(parts, volumes, strict=True):
-            mass = spec.mass * volume / sum(volumes)
-            total += SpatialInertia(mass, np.zeros(3), UnitInertia.SolidBox(*size)).Shift(-p_OP)
-        return total
-    if isinstance(shape, dom.Cylinder):
-        unit = UnitInertia.SolidCylinder(shape.radius, shape.height, [0, 0, 1])
-    elif isinstance(shape, dom.Box):
-        unit = UnitInertia.SolidBox(*shape.size)
-    else:
-        unit = UnitInertia.SolidSphere(shape.radius)
-    return SpatialInertia(spec.mass, np.zeros(3), unit)
+    """Inertia of a solid of uniform density (kg, m), about the body origin.
+
+    Where parts overlap the density counts twice: what is told is the mass of the whole.
+    """
+    parts = solid_parts(spec.shape)
+    whole = sum(part.volume for part in parts)
+    total = SpatialInertia.Zero()
+    for part in parts:
+        about_middle = SpatialInertia(spec.mass * part.volume / whole, np.zeros(3), _unit_inertia(part.solid))
+        total += about_middle.Shift(-part.X_OP.translation())
+    return total
+
+
+def rolling_damping(spec: ObjectSpec) -> float:
+    """What slows down what rolls, N m s: a torque against the rate of turning.
+
+    A ball that rolls at v thereby loses it as exp(-t / `ROLLING_TIME`) and comes to rest after
+    v * `ROLLING_TIME`, whatever its size and mass. Zero for what cannot roll.
+    """
+    if not spec.shape.rolls:
+        return 0.0
+    radius = min(spec.shape.extent) / 2
+    # A rolling ball's inertia about the point where it touches the table.
+    return 7 / 5 * spec.mass * radius**2 / ROLLING_TIME
+
+
+def resist_rolling(
+    plant: MultibodyPlant, plant_context: Context, domain: Domain, objects: Iterable[str]
+) -> None:
+    """Let all that rolls come to rest by itself.
+
+    A parameter of the context: with a damped joint of our own an object could not be locked any more.
+    """
+    for name in objects:
+        damping = rolling_damping(domain.objects[name])
+        if damping > 0:
+            plant.GetJointByName(name).SetDampingVector(plant_context, np.array([damping] * 3 + [0.0] * 3))
 
 
 def _add_object(plant: MultibodyPlant, name: str, spec: ObjectSpec, friction: float) -> RigidBody:
     body = plant.AddRigidBody(name, plant.AddModelInstance(name), object_inertia(spec))
     color = [*spec.color, 1.0]
-    if isinstance(spec.shape, dom.ToolShape):
-        parts = list(tool_parts(spec.shape))
-    else:
-        parts = [("body", RigidTransform(), spec.shape)]  # type: ignore[list-item]
-    for part, X_OP, shape in parts:
-        label = f"{name}_{part}"
-        plant.RegisterVisualGeometry(body, X_OP, drake_shape(shape), label, color)
-        _add_contact_geometry(plant, body, label, X_OP, shape, _contact(friction))
+    for part in solid_parts(spec.shape):
+        label = f"{name}_{part.label}"
+        plant.RegisterVisualGeometry(body, part.X_OP, drake_shape(part.solid), label, color)
+        _add_contact_geometry(plant, body, label, part, _contact(friction))
     return body
 
 
 def _add_contact_geometry(
-    plant: MultibodyPlant,
-    body: RigidBody,
-    label: str,
-    X_OP: RigidTransform,
-    shape: dom.Cylinder | dom.Box | dom.Sphere,
-    properties: ProximityProperties,
+    plant: MultibodyPlant, body: RigidBody, label: str, part: SolidPart, properties: ProximityProperties
 ) -> None:
-    if isinstance(shape, dom.Sphere):
+    shape, X_OP = part.solid, part.X_OP
+    if isinstance(shape, shapes.Sphere):
         plant.RegisterCollisionGeometry(body, X_OP, Sphere(shape.radius), label, properties)
         return
-    # The core ends a little above the spheres' lowest points, so that the spheres carry the object.
+    # The core ends a little short of the spheres' outermost points, so that the spheres carry the object.
     core = 0.001
-    if isinstance(shape, dom.Cylinder):
+    if isinstance(shape, shapes.Cylinder):
         solid: Shape = Cylinder(shape.radius, shape.height - core)
     else:
         solid = Box(shape.size[0], shape.size[1], shape.size[2] - core)
     plant.RegisterCollisionGeometry(body, X_OP, solid, label, properties)
-    z = -shape.height / 2 + PAD_RADIUS
-    for i, (x, y) in enumerate(_pad_places(shape)):
+    places = _pad_places(shape) if part.lowest else [(0.0, 0.0)]
+    # What sits on top of another part (a stud) has no underside, but carries what is put on it.
+    z = (-1 if part.lowest else 1) * (shape.height / 2 - PAD_RADIUS)
+    for i, (x, y) in enumerate(places):
         X_PS = RigidTransform([x, y, z])
         plant.RegisterCollisionGeometry(body, X_OP @ X_PS, Sphere(PAD_RADIUS), f"{label}_pad_{i}", properties)
 
 
-def _pad_places(shape: dom.Cylinder | dom.Box) -> list[tuple[float, float]]:
+def _pad_places(shape: shapes.Cylinder | shapes.Box) -> list[tuple[float, float]]:
     """Where the small spheres sit on the underside (metres): an outer and an inner ring, or a grid."""
-    if isinstance(shape, dom.Cylinder):
+    if isinstance(shape, shapes.Cylinder):
         outer, inner = shape.radius - PAD_RADIUS, shape.radius * 0.55
         rings = [(outer, 8), (inner, 4)]
     elif max(shape.size[:2]) <= 0.08:

@@ -13,7 +13,7 @@ from pydrake.systems.analysis import Simulator
 
 from cognitive_arch.domain import Domain, Placement, Scene
 from sim.hands import SIDES, STROKE, finger_names
-from sim.scenario import FRICTION, Scenario, build_scenario
+from sim.scenario import FRICTION, Scenario, build_scenario, resist_rolling
 
 Joints = NDArray[np.float64]
 COMMAND_PERIOD = 0.02  # s between two set points of a motion
@@ -50,6 +50,7 @@ class World:
         self.simulator = Simulator(self.diagram)
         self._context = self.simulator.get_mutable_context()
         self._plant_context = plant.GetMyMutableContextFromRoot(self._context)
+        resist_rolling(plant, self._plant_context, domain, self.scenario.objects)
         robot = self.scenario.robot
         joints = [plant.get_joint_actuator(i).joint() for i in plant.GetJointActuatorIndices(robot)]
         self.joint_names = tuple(joint.name() for joint in joints)

@@ -17,7 +17,7 @@ from cognitive_arch.world.anchoring import WorldModel
 from tests.conftest import action, literals
 
 ROOT = Path(__file__).resolve().parents[1]
-FOUNDATION = {"errors", "resources", "domain", "outside"}
+FOUNDATION = {"errors", "resources", "shapes", "footprint", "domain", "random_scenes", "outside"}
 # Each package may import those named here, the foundation, and itself.
 ALLOWED = {
     "relational": set(),

@@ -6,18 +6,23 @@ import itertools
 import math
 from collections.abc import Sequence
 
-from cognitive_arch.domain import Shape
 from cognitive_arch.outside import Place, on_table
+from cognitive_arch.shapes import Shape
 
 CLEARANCE = 0.085  # m between the centres of two things that lie side by side
+SMALL = 0.03  # m from the middle of a thing to its side, for which that clearance is meant
 
 
 def footprint(shape: Shape, yaw: float) -> tuple[Place, ...]:
-    """Points of an object relative to its centre (metres): one, or several along the shaft of a tool."""
+    """Points of an object relative to its centre (metres): one, four for what is large, or several along
+    the shaft of a tool."""
     if shape.type != "tool":
-        return ((0.0, 0.0),)
-    along = [shape.length * n / 6 for n in range(-3, 4)]
-    return tuple((d * math.cos(yaw), d * math.sin(yaw)) for d in along)
+        x, y = (max(0.0, size / 2 - SMALL) for size in shape.extent)
+        points = [(0.0, 0.0)] if x == y == 0.0 else [(x, y), (x, -y), (-x, y), (-x, -y)]
+    else:
+        points = [(shape.length * n / 6, 0.0) for n in range(-3, 4)]
+    cos, sin = math.cos(yaw), math.sin(yaw)
+    return tuple((x * cos - y * sin, x * sin + y * cos) for x, y in points)
 
 
 def nearest_free(wanted: Place, others: Sequence[Place], own: Sequence[Place] = ((0.0, 0.0),)) -> Place:

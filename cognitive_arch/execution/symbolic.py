@@ -70,7 +70,7 @@ class SymbolicEnvironment:
     def reset(self, seed: int) -> Observation:
         """See `Environment.reset`."""
         self._rng = np.random.default_rng(seed)
-        placements: dict[str, Placement] = jittered(self.scene, self.jitter, self._rng)
+        placements: dict[str, Placement] = jittered(self.scene, self.jitter, self._rng, self.domain)
         self._things = {name: _Thing(p.position, p.yaw) for name, p in sorted(placements.items())}
         self._properties = frozenset()
         self._steps = 0

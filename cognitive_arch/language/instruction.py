@@ -42,10 +42,8 @@ def offer(domain: Domain, scene_objects: Sequence[str]) -> str:
     """What can be said here, for the end of a message."""
     tools = {name for name, spec in domain.objects.items() if spec.kind == "tool"}
     verbs = "grasp, put, drop" + (", pull, push" if tools.intersection(scene_objects) else "")
-    return (
-        f"this scene has {', '.join(sorted(scene_objects)) or 'nothing'}; I can {verbs} "
-        f"them or make: {', '.join(sorted(domain.recipes)) or 'nothing'}"
-    )
+    make = f" or make: {', '.join(sorted(domain.recipes))}" if domain.recipes else ""
+    return f"this scene has {', '.join(sorted(scene_objects)) or 'nothing'}; I can {verbs} them{make}"
 
 
 def parse_instruction(sentence: str, domain: Domain, scene_objects: Sequence[str]) -> Instruction:

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import itertools
-import math
 
 import numpy as np
 
 from cognitive_arch.execution.environment import FailureReason
+from sim.footprint import disc, footprint, outer_radius, smallest_gap
 from sim.robot import Robot
 from sim.skills.put import set_down
 
-CLEARANCE = 0.085  # m between the centres of what lies on the table
+ROOM = 0.025  # m around what is put down: fingers open there
+TOOL_RADIUS = 0.03  # m about the middle of a shaft
+FREE = 0.080  # m of room; more makes a place no better
 PLACES = (np.arange(-0.24, -0.47, -0.04), np.arange(0.08, 0.30, 0.04))  # m, x and |y| to choose from
 
 
@@ -34,11 +36,20 @@ def drop(robot: Robot, args: tuple[str, ...]) -> FailureReason:
 def free_places(robot: Robot, name: str, hand: str) -> list[tuple[float, float]]:
     """Free places on the hand's side of the table, within reach, the freest first."""
     sign = -1.0 if hand == "LeftHand" else 1.0
-    others = [robot.world.pose(o).translation()[:2] for o in robot.world.scenario.objects if o != name]
+    world, shapes = robot.world, robot.domain.objects
+    others = [
+        capsule
+        for other in world.scenario.objects
+        if other != name
+        for capsule in footprint(shapes[other].shape, world.pose(other))
+    ]
+    shape = shapes[name].shape
+    # A tool reaches far, but where to depends on how it is held.
+    own = TOOL_RADIUS if shape.type == "tool" else outer_radius(shape)
     places = []
     for x, y in itertools.product(*PLACES):
         place = (float(x), sign * float(y))
-        distance = min((math.dist(place, other) for other in others), default=1.0)
-        if distance >= CLEARANCE and robot.kinematics.reaches(hand, *place):
-            places.append((-min(distance, 0.14), abs(place[1]), place))
+        room = smallest_gap([disc(place, own)], others)
+        if room >= ROOM and robot.kinematics.reaches(hand, *place):
+            places.append((-min(room, FREE), abs(place[1]), place))
     return [place for *_, place in sorted(places)]

@@ -17,6 +17,7 @@ from sim.skills.tool import carry_tool
 from sim.world import Joints
 
 TIP_HEIGHT = 0.003  # m of the finger tips above the object's underside
+DEPTH = 0.048  # m of an object that fit between the fingers: what is taller would meet the palm
 MARGIN = 0.015  # m between each open finger and the object
 SQUEEZE = 0.010  # m that the closing fingers are commanded into the object
 FIRM_SQUEEZE = 0.025  # m into a tool: enough for all the force the fingers have
@@ -74,13 +75,13 @@ def grip_choices(robot: Robot, name: str) -> tuple[float, tuple[float, ...]]:
     """Width between the fingers (metres) and the hand yaws (radians) at which the object can be held."""
     shape = robot.domain.objects[name].shape
     yaw = robot.world.pose(name).rotation().ToRollPitchYaw().yaw_angle()
-    if shape.type == "box":
-        faces = [(_wrap(yaw), shape.size[1]), (_wrap(yaw + math.pi / 2), shape.size[0])]
-        width = min(size for _, size in faces)
-        return width, tuple(angle for angle, size in faces if size <= width + 1e-6)
     if shape.type == "tool":
         return shape.width, (_wrap(yaw),)
-    return 2 * shape.radius, YAWS
+    if shape.is_round:
+        return shape.extent[0], YAWS
+    faces = [(_wrap(yaw), shape.extent[1]), (_wrap(yaw + math.pi / 2), shape.extent[0])]
+    width = min(size for _, size in faces)
+    return width, tuple(angle for angle, size in faces if size <= width + 1e-6)
 
 
 def _wrap(angle: float) -> float:
@@ -104,7 +105,8 @@ def _plan(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> tuple[
 def _targets(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> list[HandTarget]:
     """Where the finger tips could go: around an object's middle, or on a tool's handle."""
     shape, X_WO = robot.domain.objects[name].shape, robot.world.pose(name)
-    up = np.array([0.0, 0.0, TIP_HEIGHT - robot.world.height(name) / 2])
+    height = robot.world.height(name)
+    up = np.array([0.0, 0.0, max(TIP_HEIGHT, height - DEPTH) - height / 2])
     if shape.type != "tool":
         return robot.grasp_targets(hand, X_WO.translation() + aim + up, grip.yaws)
     targets = []

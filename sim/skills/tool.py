@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cognitive_arch.domain import ToolShape
 from cognitive_arch.execution.environment import FailureReason
+from cognitive_arch.shapes import ToolShape
 from cognitive_arch.world.observation import HANDS
 from sim.footprint import Capsule, Point, disc, footprint, smallest_gap
 from sim.hands import FINGER_WIDTH, STROKE

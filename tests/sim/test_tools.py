@@ -44,9 +44,9 @@ def test_the_bar_of_a_rake_is_at_its_far_end(domain: Domain) -> None:
     assert turned.a[1] == pytest.approx(bar.a[0])
 
 
-def test_jitter_turns_a_tool_only_as_far_as_it_may(scene: Scene) -> None:
+def test_jitter_turns_a_tool_only_as_far_as_it_may(domain: Domain, scene: Scene) -> None:
     for seed in range(20):
-        placements = jittered(scene, 0.02, np.random.default_rng(seed))
+        placements = jittered(scene, 0.02, np.random.default_rng(seed), domain)
         assert abs(placements["Rake"].yaw) <= scene.objects["Rake"].turn < 0.3
 
 
