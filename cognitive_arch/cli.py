@@ -101,6 +101,12 @@ def run(
     jitter: Annotated[
         float, typer.Option(help="Move the objects by up to this many metres, and turn them, at the start.")
     ] = 0.0,
+    reach: Annotated[
+        str | None,
+        typer.Option(
+            help="How the robot knows what it reaches: kinematic (drake's own way) or published (constants)."
+        ),
+    ] = None,
     rules: RulesOption = None,
     event: EventOption = [],  # noqa: B006 (typer wants a list)
     store: StoreOption = Path("runs"),
@@ -122,6 +128,7 @@ def run(
         planner=planner,
         seed=seed,
         jitter=jitter,
+        reach=reach,
         rules=rules,
         record=record,
         events=tuple(map(OutsideEvent.parse, event)),

@@ -27,6 +27,7 @@ from cognitive_arch.errors import ConfigError, one_line, unknown
 from cognitive_arch.footprint import outer_radius
 from cognitive_arch.outside import Happening, OutsideEvent, check_events
 from cognitive_arch.shapes import Frozen, Shape
+from cognitive_arch.world.observation import HANDS
 
 MIN_DISTANCE = 0.07  # metres between the centres of two objects that lie side by side
 
@@ -42,6 +43,12 @@ class ObjectSpec(Frozen):
     mass: Annotated[float, Field(gt=0, le=5)]
     color: tuple[float, float, float]
     can_pull: bool = False
+
+    @model_validator(mode="after")
+    def _tools_have_a_shaft(self) -> ObjectSpec:
+        if self.kind == "tool" and self.shape.type != "tool":
+            raise ValueError(f"a thing of kind tool needs a shape of type tool, this is a {self.shape.type}")
+        return self
 
 
 class Recipe(Frozen):
@@ -105,14 +112,26 @@ class Table(Frozen):
 
 
 class ReachLimits(Frozen):
-    """Published reach constants (metres), used where no kinematic model answers.
+    """Published reach constants (metres), used where no kinematic model answers, and to compare with it.
 
     A place is within reach if x >= `min_x`; y < -`side` only the left arm gets there, y > `side` only
-    the right one.
+    the right one. Any tool adds `tool`.
     """
 
     min_x: Annotated[float, Field(ge=-2, le=0)] = -0.49
     side: Annotated[float, Field(ge=0)] = 0.15
+    tool: Annotated[float, Field(ge=0, le=1)] = 0.30
+
+    def hands(self, x: float, y: float) -> tuple[str, ...]:
+        """The hands that get to (x, y), metres."""
+        if x < self.min_x:
+            return ()
+        left, right = y <= self.side, y >= -self.side
+        return tuple(hand for hand, ok in zip(HANDS, (left, right), strict=True) if ok)
+
+    def with_tool(self, x: float) -> bool:
+        """Whether a tool gets there."""
+        return x >= self.min_x - self.tool
 
 
 def event_from_text(value: object) -> OutsideEvent:

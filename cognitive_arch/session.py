@@ -13,7 +13,7 @@ import numpy as np
 from cognitive_arch.domain import Domain, Scene, load_domain, load_scene
 from cognitive_arch.errors import BackendError, ConfigError, RuleError, one_line, unknown
 from cognitive_arch.evaluation.metrics import speed
-from cognitive_arch.execution.backends import BACKENDS, make_environment
+from cognitive_arch.execution.backends import BACKENDS, make_environment, reach_model
 from cognitive_arch.execution.cycle import CycleSettings, EpisodeResult, PlanningCycle, Step
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.heuristics import Heuristics
@@ -132,6 +132,7 @@ class RunConfig:
     rules: str | None = None
     record: bool = True
     events: tuple[OutsideEvent, ...] = ()
+    reach: str | None = None
 
     def __post_init__(self) -> None:
         if not 0 <= self.seed < 2**63:
@@ -140,11 +141,16 @@ class RunConfig:
             raise ConfigError(f"jitter {self.jitter:g} m is out of range; valid: 0 to 0.05")
         if self.backend not in BACKENDS:
             raise ConfigError(unknown("backend", self.backend, BACKENDS))
+        reach_model(self.backend, self.reach)
         make_planner(self.planner)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for the manifest."""
-        texts = {"noise": str(self.noise), "heuristics": str(self.heuristics)}
+        texts = {
+            "noise": str(self.noise),
+            "heuristics": str(self.heuristics),
+            "reach": reach_model(self.backend, self.reach),
+        }
         return asdict(self) | texts | {"events": [str(event) for event in self.events]}
 
 
@@ -233,6 +239,7 @@ def run_task(
         noise=config.noise,
         jitter=config.jitter,
         record=config.record,
+        reach=config.reach,
     )
     try:
         _check_skills(task, config.backend, environment)
@@ -267,6 +274,7 @@ def run_task(
         "planner": config.planner,
         "heuristics": str(config.heuristics),
         "noise": str(config.noise),
+        "reach": manifest["reach"],
         "events": events,
         **outcome,
         "subgoals": task.to_json()["subgoals"],

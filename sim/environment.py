@@ -28,6 +28,7 @@ class DrakeEnvironment:
 
     `noise` maps `left` and `right` to noise levels: an arm of level n misses its aim by a Gaussian of
     n * 4 cm in x and y. `record` keeps a Meshcat recording and pictures for `save_artifacts`.
+    `reach` is `kinematic`, or `published` for the constants of the scene.
     """
 
     skills = frozenset(SKILLS)
@@ -41,11 +42,13 @@ class DrakeEnvironment:
         jitter: float = 0.0,
         record: bool = False,
         friction: float = FRICTION,
+        reach: str = "kinematic",
     ) -> None:
         self._domain = domain
         self._scene = scene
         self._noise = AimNoise(dict(noise or {}))
         self._jitter = jitter
+        self._reach = scene.reach if reach == "published" else None
         self.world = World(domain, scene, record=record, friction=friction)
         self._photographer = Photographer(self.world) if record else None
         self._robot: Robot | None = None
@@ -61,7 +64,7 @@ class DrakeEnvironment:
         """See `Environment.reset`."""
         rng = np.random.default_rng(seed)
         self.world.reset(jittered(self._scene, self._jitter, rng, self._domain))
-        self._robot = Robot(self._domain, self._scene, self.world, self._noise, rng)
+        self._robot = Robot(self._domain, self._scene, self.world, self._noise, rng, reach=self._reach)
         if self._photographer:
             self._photographer.start()
         self.world.hold(SETTLE)

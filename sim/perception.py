@@ -6,6 +6,8 @@ import math
 
 import numpy as np
 
+from cognitive_arch.domain import ReachLimits
+from cognitive_arch.footprint import outer_radius
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 from sim.hands import HANDLE, SIDES, finger_names
 from sim.kinematics import Kinematics
@@ -16,10 +18,11 @@ FALLEN = 0.05  # m below the table's top
 
 
 class OraclePerception:
-    """Looks at one world."""
+    """Looks at one world. What is within reach follows from the arms' kinematics, or from `limits`."""
 
-    def __init__(self, world: World, kinematics: Kinematics) -> None:
+    def __init__(self, world: World, kinematics: Kinematics, limits: ReachLimits | None = None) -> None:
         self._world = world
+        self._limits = limits
         self._kinematics = kinematics
 
     def observe(self) -> Observation:
@@ -75,6 +78,8 @@ class OraclePerception:
     def _can_take(self, hand: str, name: str) -> bool:
         """Whether the hand gets to where the object is held: its middle, or a tool's handle."""
         shape, X_WO = self._world.domain.objects[name].shape, self._world.pose(name)
+        if self._limits is not None:
+            return hand in self._limits.hands(float(X_WO.translation()[0]), float(X_WO.translation()[1]))
         if shape.type != "tool":
             x, y, _ = X_WO.translation()
             return self._kinematics.reaches(hand, float(x), float(y))
@@ -84,6 +89,8 @@ class OraclePerception:
 
     def _tool_reaches(self, tool: str, x: float, y: float) -> bool:
         """Whether some hand gets to where it would hold the tool with its head beyond (x, y), metres."""
+        if self._limits is not None:
+            return self._limits.with_tool(x)
         shape = self._world.domain.objects[tool].shape
         assert shape.type == "tool"
         added = shape.length - HANDLE[0] - BEYOND
@@ -92,6 +99,13 @@ class OraclePerception:
             if any(self._kinematics.reaches(hand, *place) for hand in HANDS):
                 return True
         return False
+
+    def _hooks(self, tool: str, name: str) -> bool:
+        """Whether the tool has a bar that gets behind the middle of the object, the shaft beside it."""
+        shape = self._world.domain.objects[tool].shape
+        assert shape.type == "tool"
+        beside = shape.width / 2 + outer_radius(self._world.domain.objects[name].shape)
+        return shape.bar / 2 >= beside
 
     def _see(self, name: str) -> ObjectObservation:
         world = self._world
@@ -112,6 +126,6 @@ class OraclePerception:
             position=(x, y, z),
             below=() if holder else self.supports(name),
             reachable_with=(*hands, *by_tool),
-            pullable_with=() if hands else tuple(t for t in by_tool if world.domain.objects[t].can_pull),
+            pullable_with=() if hands else tuple(t for t in by_tool if self._hooks(t, name)),
             yaw=float(X_WO.rotation().ToRollPitchYaw().yaw_angle()),
         )

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from cognitive_arch.domain import Domain, Scene
+from cognitive_arch.domain import Domain, ReachLimits, Scene
 from cognitive_arch.world.observation import HANDS
 from sim.hands import SIDES
 from sim.kinematics import (
@@ -66,7 +66,8 @@ def _other(hand: str) -> str:
 
 @dataclass
 class Robot:
-    """The iCub as skills see it. `grips` says how each full hand holds what it holds."""
+    """The iCub as skills see it. `grips` says how each full hand holds what it holds;
+    `reach` are constants that perception tells reach by, None for the arms' kinematics."""
 
     domain: Domain
     scene: Scene
@@ -74,10 +75,11 @@ class Robot:
     noise: AimNoise
     rng: np.random.Generator
     grips: dict[str, Grip] = field(default_factory=dict)
+    reach: ReachLimits | None = None
 
     def __post_init__(self) -> None:
         self.kinematics = Kinematics(self.world.joint_names, self.scene.table.height)
-        self.perception = OraclePerception(self.world, self.kinematics)
+        self.perception = OraclePerception(self.world, self.kinematics, self.reach)
 
     def top_of(self, name: str) -> float:
         """Height of an object's upper face, metres."""

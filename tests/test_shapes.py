@@ -7,7 +7,7 @@ import math
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
-from cognitive_arch.domain import load_domain
+from cognitive_arch.domain import ObjectSpec, load_domain
 from cognitive_arch.execution.placing import CLEARANCE, nearest_free
 from cognitive_arch.execution.placing import footprint as points
 from cognitive_arch.footprint import footprint, gap, outer_radius
@@ -84,3 +84,9 @@ def test_toys_come_in_every_shape() -> None:
     for name, spec in toys.objects.items():  # all of them fit between the fingers
         width = spec.shape.width if spec.shape.type == "tool" else min(spec.shape.extent)
         assert width <= 0.09, name
+
+
+def test_a_tool_has_the_shape_of_one() -> None:
+    made = {"kind": "tool", "mass": 0.1, "color": [0, 0, 0], "shape": {"type": "sphere", "radius": 0.02}}
+    with pytest.raises(ValidationError, match="needs a shape of type tool, this is a sphere"):
+        ObjectSpec.model_validate(made)

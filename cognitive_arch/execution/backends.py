@@ -3,16 +3,36 @@
 from __future__ import annotations
 
 import importlib
+from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 from cognitive_arch.domain import Domain, Scene
-from cognitive_arch.errors import BackendError, one_line, unknown
+from cognitive_arch.errors import BackendError, ConfigError, one_line, unknown
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.relational.rules import RuleSet
 
 BACKENDS = ("drake", "symbolic")
+REACH_MODELS: Mapping[str, tuple[str, ...]] = {  # what each backend can tell reach by, its own way first
+    "drake": ("kinematic", "published"),
+    "symbolic": ("published",),
+}
+
+
+def reach_model(backend: str, asked: str | None = None) -> str:
+    """How reach is told: `kinematic` by solving for the arms' joints, `published` by the constants of the
+    scene (ch. 6 of the thesis). None is the backend's own way. Raises `ConfigError`."""
+    known = REACH_MODELS[backend]
+    if asked is None:
+        return known[0]
+    if asked not in {name for names in REACH_MODELS.values() for name in names}:
+        raise ConfigError(unknown("reach", asked, REACH_MODELS["drake"]))
+    if asked not in known:
+        raise ConfigError(
+            f"the {backend} backend has no {asked} reach, for it has no arms; valid: {', '.join(known)}"
+        )
+    return asked
 
 
 def make_environment(
@@ -24,18 +44,20 @@ def make_environment(
     noise: NoiseLevels,
     jitter: float = 0.0,
     record: bool = False,
+    reach: str | None = None,
 ) -> Environment:
     """An environment for one scene; raises `BackendError` for an unknown or unusable one.
 
     `rules` are the truth of the symbolic world; physics needs none. `record` keeps what
-    `save_artifacts` needs.
+    `save_artifacts` needs. `reach` is one of the backend's `REACH_MODELS`.
     """
+    if backend not in BACKENDS:
+        raise BackendError(unknown("backend", backend, BACKENDS))
+    reach = reach_model(backend, reach)
     if backend == "symbolic":
         from cognitive_arch.execution.symbolic import SymbolicEnvironment
 
         return SymbolicEnvironment(domain, scene, rules, noise, jitter)
-    if backend != "drake":
-        raise BackendError(unknown("backend", backend, BACKENDS))
     try:
         module: Any = importlib.import_module("sim.environment")
     except ImportError as error:
@@ -44,6 +66,6 @@ def make_environment(
             "install the packages drake and icub-models, or use --backend symbolic"
         ) from None
     environment: Environment = module.DrakeEnvironment(
-        domain, scene, noise=asdict(noise), jitter=jitter, record=record
+        domain, scene, noise=asdict(noise), jitter=jitter, record=record, reach=reach
     )
     return environment

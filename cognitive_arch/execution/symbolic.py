@@ -26,7 +26,6 @@ from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 
 PULL_DISTANCE = 0.20  # metres that a pull brings an object closer (published)
-TOOL_REACH = 0.30  # metres that a tool adds to the arms' reach
 CLEARANCE = 0.075  # metres between the centres of two things on the table
 
 _REASONS = {
@@ -198,9 +197,9 @@ class SymbolicEnvironment:
     def _see(self, name: str) -> ObjectObservation:
         thing, spec = self._things[name], self.domain.objects[name]
         x, y = self._xy(name)
-        hands = HANDS if thing.hand else self._arms_reaching(x, y)
+        hands = HANDS if thing.hand else self.scene.reach.hands(x, y)
         tools: tuple[str, ...] = ()
-        if x >= self.scene.reach.min_x - TOOL_REACH:
+        if self.scene.reach.with_tool(x):
             tools = tuple(t for t in self._things if self.domain.objects[t].kind == "tool" and t != name)
         pullers = tuple(t for t in tools if self.domain.objects[t].can_pull)
         return ObjectObservation(
@@ -212,13 +211,6 @@ class SymbolicEnvironment:
             pullable_with=() if hands else pullers,
             yaw=thing.yaw,
         )
-
-    def _arms_reaching(self, x: float, y: float) -> tuple[str, ...]:
-        reach = self.scene.reach
-        if x < reach.min_x:
-            return ()
-        left, right = y <= reach.side, y >= -reach.side
-        return tuple(hand for hand, ok in zip(HANDS, (left, right), strict=True) if ok)
 
     # -- acting -------------------------------------------------------------------------------------
 
@@ -269,7 +261,8 @@ class SymbolicEnvironment:
     def _shift(self, name: str, closer: bool) -> None:
         """A pull brings a thing closer by a fixed way; a push ends, as its rule says, out of all reach."""
         x, y = self._xy(name)
-        x = x + PULL_DISTANCE if closer else min(x, self.scene.reach.min_x - TOOL_REACH - 0.01)
+        reach = self.scene.reach
+        x = x + PULL_DISTANCE if closer else min(x, reach.min_x - reach.tool - 0.01)
         self._things[name] = replace(self._things[name], place=(x, y), support=None)
 
     def _drop(self, name: str, hand: str) -> None:
@@ -284,7 +277,7 @@ class SymbolicEnvironment:
         for dx, dy in sorted(offsets, key=lambda d: (math.hypot(*d), d)):
             place = (x0 + dx, y0 + dy)
             free = all(math.dist(place, other) >= CLEARANCE for other in others)
-            if free and place[0] <= -0.2 and hand in self._arms_reaching(*place):
+            if free and place[0] <= -0.2 and hand in self.scene.reach.hands(*place):
                 return place
         return x0, y0
 
