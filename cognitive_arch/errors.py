@@ -38,6 +38,10 @@ class BackendError(CogArchError):
     """An environment cannot be set up on this machine or for this scene."""
 
 
+class StateError(CogArchError):
+    """A saved state does not fit where it is to be restored."""
+
+
 class StoreError(CogArchError):
     """The run store cannot be opened, read or written."""
 

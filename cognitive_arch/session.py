@@ -250,16 +250,19 @@ def run_task(
         with RunStore(store_folder, create=True) as store:
             progress.on_task(task)
             with store.begin(f"{setting.scene.name}-{config.backend}-{config.seed}", manifest) as run:
+                environment.record_into(run.folder)
                 actions: list[dict[str, Any]] = []
 
                 def on_step(step: Step) -> None:
+                    if step.action is not None:
+                        environment.keep_step(step.number)
                     record = run.add_step(step)
                     if step.action is not None:
                         actions.append(action_record(record))
                     progress.on_step(step)
 
                 result = session.perform(task, Progress(on_act=progress.on_act, on_step=on_step))
-                artifacts = [str(run.folder / name) for name in environment.save_artifacts(run.folder)]
+                artifacts = [str(run.folder / name) for name in environment.save_artifacts()]
                 outcome = result_record(result, speed(result.total))
                 outcome["wall_s"] = round(time.perf_counter() - started, 3)
                 run.finish(outcome | {"artifacts": artifacts})

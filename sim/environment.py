@@ -9,11 +9,14 @@ import numpy as np
 
 from cognitive_arch.domain import Domain, Scene, jittered
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
+from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.symbols import GroundAction
+from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
 from sim.meddling import disturb
 from sim.pictures import Photographer
+from sim.recorder import Recorder
 from sim.robot import AimNoise, Robot
 from sim.scenario import FRICTION
 from sim.skills import SKILLS
@@ -21,13 +24,14 @@ from sim.skills.base import let_go_of_lost, unusable_arguments
 from sim.world import World
 
 SETTLE = 0.3  # s before the first look
+FORMAT = 1  # of saved states
 
 
 class DrakeEnvironment:
     """A simulated iCub at a table; see `Environment`.
 
     `noise` maps `left` and `right` to noise levels: an arm of level n misses its aim by a Gaussian of
-    n * 4 cm in x and y. `record` keeps a Meshcat recording and pictures for `save_artifacts`.
+    n * 4 cm in x and y. `record` makes pictures, a trajectory and a Meshcat recording of an episode.
     `reach` is `kinematic`, or `published` for the constants of the scene.
     """
 
@@ -50,8 +54,10 @@ class DrakeEnvironment:
         self._jitter = jitter
         self._reach = scene.reach if reach == "published" else None
         self.world = World(domain, scene, record=record, friction=friction)
+        self.recorder = Recorder(self.world, keep=record)
         self._photographer = Photographer(self.world) if record else None
         self._robot: Robot | None = None
+        self._folder: Path | None = None
 
     @property
     def robot(self) -> Robot:
@@ -64,13 +70,17 @@ class DrakeEnvironment:
         """See `Environment.reset`."""
         rng = np.random.default_rng(seed)
         self.world.reset(jittered(self._scene, self._jitter, rng, self._domain))
-        self._robot = Robot(self._domain, self._scene, self.world, self._noise, rng, reach=self._reach)
+        self.recorder.restart()
+        self._robot = self._new_robot(rng)
         if self._photographer:
             self._photographer.start()
         self.world.hold(SETTLE)
         if self._photographer:
             self._photographer.take("start")
         return self.observe()
+
+    def _new_robot(self, rng: np.random.Generator) -> Robot:
+        return Robot(self._domain, self._scene, self.world, self._noise, rng, reach=self._reach)
 
     def observe(self) -> Observation:
         """See `Environment.observe`."""
@@ -87,12 +97,17 @@ class DrakeEnvironment:
         let_go_of_lost(self.robot)
         started, name = self.world.time, action.args[0]
         before = self.world.pose(name).translation()
+        hand = action.args[-1]
+        held = self.robot.perception.held(hand)
+        self.recorder.begin(str(action))
         reason = entry.perform(self.robot, action.args)
         if self._photographer:
             self._photographer.after_action()
         moved = self.world.pose(name).translation() - before
         effect = {f"displacement_{axis}": float(d) for axis, d in zip("xyz", moved, strict=True)}
         effect["duration"] = self.world.time - started
+        effect |= self.recorder.measured(hand, held, name)
+        self.recorder.begin()
         outcome = Outcome.SUCCESS if reason is FailureReason.NONE else Outcome.FAILURE
         return SkillResult(outcome, reason, effect)
 
@@ -104,12 +119,43 @@ class DrakeEnvironment:
         """See `Environment.settle`."""
         self.world.hold(seconds)
 
-    def save_artifacts(self, folder: Path) -> tuple[str, ...]:
-        """Write `start.png`, `end.png` and `recording.html` (with `record`); returns their names."""
+    def save(self) -> SavedState:
+        """See `Environment.save`."""
+        robot = self.robot.save() | {"rng": save_rng(self.robot.rng)}
+        return {"kind": "drake", "format": FORMAT, "world": self.world.save(), "robot": robot}
+
+    def restore(self, saved: SavedState) -> Observation:
+        """See `Environment.restore`."""
+        with restoring(saved, "drake", FORMAT):
+            rng = restore_rng(saved["robot"]["rng"])
+            robot = self._new_robot(rng)
+            robot.restore(saved["robot"])
+            self.world.restore(saved["world"])
+        self._robot = robot
+        self.recorder.restart()
+        return self.observe()
+
+    def record_into(self, folder: Path) -> None:
+        """See `Environment.record_into`."""
         if self._photographer is None:
+            return
+        self._folder = folder
+        path = folder / TRAJECTORY
+        if path.exists():
+            self.recorder.restart(Trajectory.load(path).until(self.world.time))
+
+    def keep_step(self, number: int) -> None:
+        """See `Environment.keep_step`."""
+        if self._folder is not None:
+            self.recorder.trajectory().save(self._folder / TRAJECTORY)
+
+    def save_artifacts(self) -> tuple[str, ...]:
+        """See `Environment.save_artifacts`."""
+        if self._photographer is None or self._folder is None:
             return ()
+        self.recorder.trajectory().save(self._folder / TRAJECTORY)
         self._photographer.take("end")
-        return self._photographer.save(folder)
+        return (*self._photographer.save(self._folder), TRAJECTORY)
 
     def close(self) -> None:
         """See `Environment.close`."""

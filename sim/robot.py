@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -59,6 +60,15 @@ class Grip:
     yaws: tuple[float, ...]
     carrying: Joints
 
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; `from_json` reads it back."""
+        return asdict(self) | {"yaws": list(self.yaws), "carrying": self.carrying.tolist()}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Grip:
+        """The inverse of `to_json`."""
+        return cls(**{**data, "yaws": tuple(data["yaws"]), "carrying": np.array(data["carrying"], float)})
+
 
 def _other(hand: str) -> str:
     return next(h for h in HANDS if h != hand)
@@ -80,6 +90,14 @@ class Robot:
     def __post_init__(self) -> None:
         self.kinematics = Kinematics(self.world.joint_names, self.scene.table.height)
         self.perception = OraclePerception(self.world, self.kinematics, self.reach)
+
+    def save(self) -> dict[str, Any]:
+        """What the robot remembers from one action to the next, as plain data."""
+        return {"grips": {hand: grip.to_json() for hand, grip in sorted(self.grips.items())}}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """The inverse of `save`."""
+        self.grips = {hand: Grip.from_json(grip) for hand, grip in saved["grips"].items()}
 
     def top_of(self, name: str) -> float:
         """Height of an object's upper face, metres."""

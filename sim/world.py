@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -62,6 +63,9 @@ class World:
         }
         self.home = np.array([HOME.get(n, STROKE if "finger" in n else 0.0) for n in self.joint_names])
         self.command = self.home.copy()
+        self.set_point = self.command  # what the controllers are being asked for at this moment
+        self.on_tick: Callable[[], None] = lambda: None
+        self._seen_contacts: tuple[float, frozenset[tuple[str, str]]] | None = None
 
     def _add_meshcat(self) -> None:
         params = MeshcatParams(host="localhost", port=None, show_stats_plot=False)
@@ -78,6 +82,7 @@ class World:
         """
         plant, context = self.plant, self._plant_context
         self._context.SetTime(0.0)
+        self._seen_contacts = None
         positions = np.zeros(plant.num_positions())
         positions[self._positions] = self.home
         plant.SetPositions(context, positions)
@@ -132,7 +137,15 @@ class World:
         return measured
 
     def contacts(self) -> frozenset[tuple[str, str]]:
-        """Names of the bodies that press on each other now, each pair in both orders."""
+        """Names of the bodies that press on each other now, each pair in both orders.
+
+        They change only while time passes, for they are those of the last step of the simulation.
+        """
+        if self._seen_contacts is None or self._seen_contacts[0] != self.time:
+            self._seen_contacts = self.time, self._find_contacts()
+        return self._seen_contacts[1]
+
+    def _find_contacts(self) -> frozenset[tuple[str, str]]:
         results = self.plant.get_contact_results_output_port().Eval(self._plant_context)
         pairs = set()
         for i in range(results.num_point_pair_contacts()):
@@ -142,9 +155,52 @@ class World:
                 pairs.update({(a, b), (b, a)})
         return frozenset(pairs)
 
+    # -- keeping ------------------------------------------------------------------------------------
+
+    def save(self) -> dict[str, Any]:
+        """All that decides what happens next, as plain data.
+
+        The contacts are those of the last step of the simulation, which the state alone does not tell.
+        """
+        plant, context, objects = self.plant, self._plant_context, self.scenario.objects
+        return {
+            "time": self.time,
+            "joints": list(self.joint_names),
+            "state": plant.GetPositionsAndVelocities(context).tolist(),
+            "desired": self._desired.Eval(context).tolist(),
+            "command": self.command.tolist(),
+            "locked": sorted(name for name, body in objects.items() if body.is_locked(context)),
+            "objects": sorted(objects),
+            "contacts": sorted([a, b] for a, b in self.contacts() if a < b),
+        }
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Back to what `save` saw; raises `ValueError` if it was another world's, before anything moves."""
+        plant, context, objects = self.plant, self._plant_context, self.scenario.objects
+        if saved["joints"] != list(self.joint_names) or saved["objects"] != sorted(objects):
+            raise ValueError("it has other joints or objects")
+        state, desired, command = (np.array(saved[key], float) for key in ("state", "desired", "command"))
+        if not np.isfinite(np.concatenate([state, desired, command])).all():
+            raise ValueError("its numbers are not finite")
+        n = len(self.joint_names)
+        if (len(state), len(desired), len(command)) != (plant.num_multibody_states(), 2 * n, n):
+            raise ValueError("its vectors have other lengths")
+        time, locked = float(saved["time"]), set(saved["locked"])
+        contacts = {(str(a), str(b)) for a, b in saved["contacts"]}
+        self._context.SetTime(time)
+        for name, body in objects.items():
+            # Locking stops a body, so positions and velocities come after it.
+            (body.Lock if name in locked else body.Unlock)(context)
+        plant.SetPositionsAndVelocities(context, state)
+        self._send(desired[:n], desired[n:])
+        self.command = command
+        self._seen_contacts = time, frozenset(contacts | {(b, a) for a, b in contacts})
+        self.simulator.Initialize()
+
     # -- moving -------------------------------------------------------------------------------------
 
     def _send(self, position: Joints, velocity: Joints) -> None:
+        self.set_point = position
         self._desired.FixValue(self._plant_context, np.concatenate([position, velocity]))
 
     def follow(self, waypoints: Sequence[Joints], seconds: float) -> None:
@@ -159,14 +215,20 @@ class World:
             piece = min(int(along), pieces - 1)
             point = path[piece] + (along - piece) * (path[piece + 1] - path[piece])
             self._send(point, (point - previous) / COMMAND_PERIOD)
-            self.simulator.AdvanceTo(start + seconds * u)
+            self._advance(start + seconds * u)
             previous = point
         self.command = previous
         self._send(previous, np.zeros(len(previous)))
 
     def hold(self, seconds: float) -> None:
         """Let time pass with the set point where it is."""
-        self.simulator.AdvanceTo(self.time + seconds)
+        start, ticks = self.time, max(1, round(seconds / COMMAND_PERIOD))
+        for tick in range(1, ticks + 1):
+            self._advance(start + seconds * tick / ticks)
+
+    def _advance(self, time: float) -> None:
+        self.simulator.AdvanceTo(time)
+        self.on_tick()
 
     def with_fingers(self, joints: Joints, hand: str, opening: float) -> Joints:
         """`joints` with both fingers of `hand` at `opening` metres from the middle."""

@@ -8,6 +8,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
+from cognitive_arch.execution.saving import SavedState
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.world.observation import Observation
@@ -46,7 +47,13 @@ class SkillResult:
     """What one action did.
 
     `outcome` is judged from what was observed afterwards, never asserted by the skill. `effect` holds
-    measured numbers in SI units (for example `displacement_x`, `lift`, `duration`).
+    numbers measured in the meantime; an environment may leave out what it cannot measure:
+
+    - `displacement_x`, `displacement_y`, `displacement_z`: how far the first argument came, m;
+    - `duration`: how long the action took, s;
+    - `contact_duration`: how long the manipulator (the hand, or the tool it holds) touched the first
+      argument, s; `object_contact_duration`: how long other objects touched it, s;
+    - `hand_speed`, `object_speed`: how fast hand and first argument were at most, m/s.
     """
 
     outcome: Outcome
@@ -90,8 +97,35 @@ class Environment(Protocol):
         """Let the world go on for a while without acting."""
         ...
 
-    def save_artifacts(self, folder: Path) -> tuple[str, ...]:
-        """Write recordings and pictures of the episode into `folder`; returns their file names."""
+    def save(self) -> SavedState:
+        """All that decides what happens next, as plain data for JSON.
+
+        Law: restored, in any process and also before any `reset`, it gives the same observations and
+        results for the same actions, to the last bit, and the same state to save.
+        """
+        ...
+
+    def restore(self, saved: SavedState) -> Observation:
+        """Go back to where `save` was called, in an environment of the same construction, and look.
+
+        Raises `StateError` for a state that does not fit.
+        """
+        ...
+
+    def record_into(self, folder: Path) -> None:
+        """Keep what can be kept of the episode (pictures, trajectory) in `folder` from now on.
+
+        What `folder` holds of the same episode up to now, from before a `restore`, is taken up. Does
+        nothing in an environment that was not built to record.
+        """
+        ...
+
+    def keep_step(self, number: int) -> None:
+        """Bring the folder up to date after action `number`; a killed run has what was kept so far."""
+        ...
+
+    def save_artifacts(self) -> tuple[str, ...]:
+        """Finish what is kept of the episode; returns the names of all files, none without recording."""
         ...
 
     def close(self) -> None:

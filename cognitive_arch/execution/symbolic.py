@@ -8,25 +8,28 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from cognitive_arch.domain import Domain, Placement, Scene, jittered
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.placing import Place, footprint, nearest_free
+from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
 from cognitive_arch.outside import Happening, OutsideEvent
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
-from cognitive_arch.relational.symbols import GroundAction, Literal, State
+from cognitive_arch.relational.symbols import GroundAction, Literal, State, parse_literal
 from cognitive_arch.relational.transition import covering_rule
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 
 PULL_DISTANCE = 0.20  # metres that a pull brings an object closer (published)
 CLEARANCE = 0.075  # metres between the centres of two things on the table
+FORMAT = 1  # of saved states
 
 _REASONS = {
     ("on", False): FailureReason.COVERED,
@@ -46,6 +49,9 @@ class _Thing:
     yaw: float = 0.0
     support: str | None = None
     hand: str | None = None
+
+
+_THINGS = TypeAdapter(list[tuple[str, _Thing]])
 
 
 @dataclass
@@ -164,8 +170,51 @@ class SymbolicEnvironment:
     def settle(self, seconds: float) -> None:
         """Nothing moves by itself here."""
 
-    def save_artifacts(self, folder: Path) -> tuple[str, ...]:
+    def save(self) -> SavedState:
+        """See `Environment.save`."""
+        return {
+            "kind": "symbolic",
+            "format": FORMAT,
+            "things": [[name, asdict(thing)] for name, thing in self._things.items()],
+            "properties": sorted(self._properties),
+            "steps": self._steps,
+            "rng": save_rng(self._rng),
+        }
+
+    def restore(self, saved: SavedState) -> Observation:
+        """See `Environment.restore`."""
+        with restoring(saved, "symbolic", FORMAT):
+            things = dict(_THINGS.validate_python(saved["things"]))
+            self._check(things)
+            properties = frozenset(str(parse_literal(text).atom) for text in saved["properties"])
+            rng, steps = restore_rng(saved["rng"]), int(saved["steps"])
+        self._rng, self._steps, self._things, self._properties = rng, steps, things, properties
+        self._reground()
+        return self.observe()
+
+    def _check(self, things: Mapping[str, _Thing]) -> None:
+        """Raise `ValueError` for things that are not of this scene or rest on each other in a circle."""
+        where = {thing.hand for thing in things.values()} | {thing.support for thing in things.values()}
+        strangers = set(things) - set(self.scene.things) | where - {None, *HANDS, *things}
+        if strangers:
+            raise ValueError(f"{', '.join(sorted(map(str, strangers)))} is not in this scene")
+        for name in things:
+            below = {name}
+            support = things[name].support
+            while support is not None:
+                if support in below:
+                    raise ValueError(f"{name} rests on itself")
+                below.add(support)
+                support = things[support].support
+
+    def record_into(self, folder: Path) -> None:
         """Nothing to show: there are no pictures of symbols."""
+
+    def keep_step(self, number: int) -> None:
+        """Nothing to show."""
+
+    def save_artifacts(self) -> tuple[str, ...]:
+        """Nothing to show."""
         return ()
 
     def close(self) -> None:

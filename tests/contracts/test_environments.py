@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from collections.abc import Iterator
 from typing import Any
@@ -9,7 +10,7 @@ from typing import Any
 import pytest
 
 from cognitive_arch.domain import Domain, load_domain, load_scene
-from cognitive_arch.errors import BackendError
+from cognitive_arch.errors import BackendError, StateError
 from cognitive_arch.execution.backends import BACKENDS, make_environment
 from cognitive_arch.execution.environment import Environment, FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
@@ -227,3 +228,64 @@ def test_nothing_is_said_of_a_tool_that_is_not_there(backend: str) -> None:
     assert happen(env, "remove:Rake") == ("Rake",)
     assert not [a for a in atoms(env) if "Rake" in a]
     env.close()
+
+
+# -- saved states -----------------------------------------------------------------------------------
+
+
+def saveable(backend: str) -> Environment:
+    events = ("1:add:Cheese:-0.30,0.20",)
+    return build(backend, *events, jitter=0.02, noise=NoiseLevels(left=0.3, right=0.3))
+
+
+def two_actions(environment: Environment) -> list[object]:
+    """What is seen and told, and the state afterwards."""
+    seen: list[object] = [environment.observe()]
+    for call in ("putOnWith(Ham,Bun-bottom,LeftHand)", "graspWith(Bun-top,RightHand)"):
+        seen += [environment.execute(action(call)), environment.observe()]
+    environment.settle(0.1)
+    return [*seen, environment.observe(), json.dumps(environment.save())]
+
+
+@pytest.mark.parametrize("backend", ["symbolic", DRAKE])
+def test_a_restored_state_goes_on_to_the_last_bit(backend: str) -> None:
+    """With something in the hand, something removed and something still to be added; the noise draws on."""
+    first = saveable(backend)
+    first.reset(3)
+    first.execute(action("graspWith(Ham,LeftHand)"))
+    saved = json.dumps(first.save())
+    assert json.dumps(first.save()) == saved
+    told = two_actions(first)
+    happen(first, "add:Cheese:-0.30,0.20")
+    assert first.restore(json.loads(saved)) == told[0]
+    assert two_actions(first) == told
+    fresh = saveable(backend)
+    assert fresh.restore(json.loads(saved)) == told[0]
+    assert json.dumps(fresh.save()) == saved
+    assert two_actions(fresh) == told
+    assert happen(fresh, "add:Cheese:-0.30,0.20") == ("Cheese",)
+
+
+@pytest.mark.parametrize("backend", ["symbolic", DRAKE])
+def test_a_state_that_does_not_fit_is_refused_in_one_line(backend: str) -> None:
+    environment = build(backend)
+    environment.reset(0)
+    saved, seen_before = environment.save(), environment.observe()
+    other = make_other(backend)
+    bad: list[dict[str, Any]] = [{}, {"kind": saved["kind"]}, saved | {"format": 99}, other.save()]
+    bad += [saved | {key: None} for key in saved]
+    bad += [saved | {key: "x"} for key in saved]
+    for state in bad:
+        with pytest.raises(StateError, match="does not fit") as error:
+            environment.restore(state)
+        assert len(str(error.value).splitlines()) == 1
+    assert environment.observe() == seen_before
+    assert environment.save() == saved
+
+
+def make_other(backend: str) -> Environment:
+    domain = load_domain("sandwich")
+    scene = load_scene("kitchen")
+    other = make_environment(backend, domain, scene, load_rules(domain.rules_path), noise=NoiseLevels())
+    other.reset(0)
+    return other

@@ -13,6 +13,7 @@ from sim.check import mirrored
 from sim.environment import DrakeEnvironment
 from sim.footprint import Capsule, disc, gap, smallest_gap, tool_footprint
 from tests.conftest import action
+from tests.sim.physics import check_physics
 
 
 @pytest.fixture(scope="module")
@@ -81,6 +82,7 @@ def test_what_a_stick_cannot_do(complex_scene: DrakeEnvironment) -> None:
 @pytest.mark.parametrize("hand", ["LeftHand", "RightHand"])
 def test_pull_brings_it_within_reach_and_keeps_the_tool(domain: Domain, scene: Scene, hand: str) -> None:
     environment = DrakeEnvironment(domain, mirrored(scene) if hand == "LeftHand" else scene)
+    environment.recorder.keep = True
     before = {obj.name: obj for obj in environment.reset(0).objects}
     assert not set(before["Ham"].reachable_with) & {"LeftHand", "RightHand"}
     assert environment.execute(action(f"graspWith(Rake,{hand})")).outcome is Outcome.SUCCESS
@@ -92,3 +94,7 @@ def test_pull_brings_it_within_reach_and_keeps_the_tool(domain: Domain, scene: S
     assert environment.robot.perception.held(hand) == "Rake"
     for name in ("Bun-bottom", "Bun-top", "Stick", "Tomato"):
         assert math.dist(before[name].position, after[name].position) < 0.005, name
+    assert 0.5 < result.effect["contact_duration"] < result.effect["duration"]  # the bar on the ham
+    assert 0.1 < result.effect["object_speed"] < 1.0
+    assert 0.1 < result.effect["hand_speed"] < 1.0
+    check_physics(environment.recorder.trajectory())
