@@ -9,13 +9,17 @@ import io
 import json
 import os
 import sys
+from collections.abc import Callable
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from cognitive_arch import __version__
-from cognitive_arch.errors import CogArchError, one_line
+from cognitive_arch.errors import CogArchError, ConfigError, one_line
+
+if TYPE_CHECKING:
+    from cognitive_arch.session import Progress
 
 INTERRUPTED = 130
 
@@ -87,7 +91,16 @@ def parse(
 
 @app.command()
 def run(
-    sentence: Sentence,
+    context: typer.Context,
+    sentence: Annotated[
+        str | None, typer.Argument(help='What to do, for example "make a ham sandwich".')
+    ] = None,
+    resume: Annotated[
+        str | None,
+        typer.Option(
+            metavar="RUN", help="Go on with an interrupted run: its id, the start of one, or 'latest'."
+        ),
+    ] = None,
     scene: SceneOption = "simple",
     backend: Annotated[str, typer.Option(help="drake (physics) or symbolic (a coin).")] = "drake",
     noise: Annotated[
@@ -114,12 +127,18 @@ def run(
     as_json: Json = False,
 ) -> None:
     """Do what a sentence asks for: look, plan, act, notice what went wrong, find another way."""
-    from cognitive_arch import report
     from cognitive_arch.execution.heuristics import Heuristics
     from cognitive_arch.execution.noise import NoiseLevels
     from cognitive_arch.outside import OutsideEvent
-    from cognitive_arch.session import RunConfig, run_task
+    from cognitive_arch.session import RunConfig, resume_task, run_task
 
+    if resume is not None:
+        _check_alone(context, "--resume", {"resume", "store", "as_json"})
+        _carry_out(lambda progress: resume_task(resume, store, progress), store, as_json)
+        return
+    if sentence is None:
+        raise ConfigError('give a sentence, such as "make a ham sandwich", or --resume RUN')
+    task = sentence
     config = RunConfig(
         scene=scene,
         backend=backend,
@@ -133,8 +152,30 @@ def run(
         record=record,
         events=tuple(map(OutsideEvent.parse, event)),
     )
-    with report.LiveProgress(quiet=as_json) as live:
-        result = run_task(sentence, config, store, live.progress)
+    _carry_out(lambda progress: run_task(task, config, store, progress), store, as_json)
+
+
+def _check_alone(context: typer.Context, option: str, allowed: set[str]) -> None:
+    """Refuse whatever was given besides `option` and would contradict what it names."""
+    for parameter in context.command.params:
+        name = str(parameter.name)
+        source = context.get_parameter_source(name)
+        if name not in allowed and source is not None and source.name == "COMMANDLINE":
+            given = "a sentence" if name == "sentence" else parameter.opts[0]
+            raise ConfigError(f"{option} takes no {given.removeprefix('a ')}: a run goes on as it was begun")
+
+
+def _carry_out(work: Callable[[Progress], dict[str, Any]], store: Path, as_json: bool) -> None:
+    """Do a run, tell of it meanwhile, and print how it ended."""
+    from cognitive_arch import report
+    from cognitive_arch.session import RunInterrupted
+
+    try:
+        with report.LiveProgress(quiet=as_json) as live:
+            result = work(live.progress)
+    except RunInterrupted as stopped:
+        command = report.resume_command(stopped.run_id, store)
+        raise _Stopped(f"finished steps are kept, go on with: {command}") from None
     _print(result, report.result_text(result), as_json)
     if not result["success"]:
         raise typer.Exit(1)
@@ -162,11 +203,11 @@ def demo(
     chosen = demos.find(name)
     config = chosen.config(backend, seed, record)
     _print({}, "" if as_json else report.demo_text(chosen, config), False)
-    with report.LiveProgress(quiet=as_json) as live:
-        result = run_task(chosen.sentence, config, store, live.progress)
-    _print({"demo": name} | result, report.result_text(result), as_json)
-    if not result["success"]:
-        raise typer.Exit(1)
+
+    def work(progress: Progress) -> dict[str, Any]:
+        return {"demo": name} | run_task(chosen.sentence, config, store, progress)
+
+    _carry_out(work, store, as_json)
 
 
 @app.command()
@@ -258,6 +299,8 @@ def _guarded() -> int:
         return code if isinstance(code, int) else 0
     except CogArchError as error:
         return _complain(str(error))
+    except _Stopped as stopped:
+        return _interrupted(f"; {stopped}")
     except KeyboardInterrupt:
         return _interrupted()
     except OSError as error:
@@ -271,9 +314,12 @@ def _guarded() -> int:
         return _complain(message)
 
 
-def _interrupted() -> int:
-    kept = "; finished steps are kept, see: cogarch inspect" if {"run", "demo"} & set(sys.argv[1:2]) else ""
-    print(f"interrupted{kept}", file=sys.stderr)
+class _Stopped(Exception):
+    """Ctrl-C with something to say; no `KeyboardInterrupt`, which the argument parser would swallow."""
+
+
+def _interrupted(more: str = "") -> int:
+    print(f"interrupted{more}", file=sys.stderr)
     return INTERRUPTED
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from cognitive_arch.errors import ConfigError, StoreError, unknown
-from cognitive_arch.report import step_text
-from cognitive_arch.runlog.store import Run, RunStore
+from cognitive_arch.report import resume_command, step_text
+from cognitive_arch.runlog.store import Run, RunStatus, RunStore
 from cognitive_arch.world.state import WorldState, sorted_atoms
 
 FORMATS = ("text", "jsonl")
@@ -84,7 +84,10 @@ def _run(run: Run, steps: list[dict[str, Any]], format_: str) -> View:
 
 def _ending(run: Run, steps: list[dict[str, Any]]) -> str:
     if run.result is None:
-        return f"{run.status} after {len(steps)} finished steps"
+        ending = f"{run.status} after {len(steps)} finished steps"
+        if run.status is RunStatus.INTERRUPTED:
+            ending += f"; go on with: {resume_command(run.run_id, run.folder.parent)}"
+        return ending
     result = run.result
     verdict = "done" if result["success"] else f"failed: {result['explanation']}"
     return f"{verdict} ({result['good']} of {result['total']} actions worked, speed {result['speed']:.2f})"

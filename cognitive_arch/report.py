@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import os
+import shlex
 import sys
 import textwrap
 from collections.abc import Sequence
+from pathlib import Path
 from types import TracebackType
 from typing import Any
 
@@ -85,6 +87,13 @@ def result_text(result: dict[str, Any]) -> str:
     ]
     lines.extend(f"wrote {path}" for path in result["artifacts"])
     return "\n".join(lines)
+
+
+def resume_command(run_id: str, store: Path) -> str:
+    """What to type to go on with a run, the store named only where it is not the usual one."""
+    usual = Path(os.environ.get("COGARCH_STORE", "runs"))
+    words = ["cogarch", "run", "--resume", run_id]
+    return shlex.join(words if store == usual else [*words, "--store", str(store)])
 
 
 def _joined(literals: Sequence[object]) -> str:

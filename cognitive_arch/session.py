@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import hashlib
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -11,13 +13,14 @@ from typing import Any
 import numpy as np
 
 from cognitive_arch.domain import Domain, Scene, load_domain, load_scene
-from cognitive_arch.errors import BackendError, ConfigError, RuleError, one_line, unknown
+from cognitive_arch.errors import BackendError, ConfigError, RuleError, StoreError, one_line, unknown
 from cognitive_arch.evaluation.metrics import speed
 from cognitive_arch.execution.backends import BACKENDS, make_environment, reach_model
-from cognitive_arch.execution.cycle import CycleSettings, EpisodeResult, PlanningCycle, Step
+from cognitive_arch.execution.cycle import CycleSettings, CycleState, EpisodeResult, PlanningCycle, Step
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
+from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
 from cognitive_arch.language.goals import GoalCompiler
 from cognitive_arch.language.instruction import parse_instruction
 from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
@@ -29,10 +32,11 @@ from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
 from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction
 from cognitive_arch.runlog.records import action_record, result_record, versions
-from cognitive_arch.runlog.store import RunStore
+from cognitive_arch.runlog.store import Checkpoint, Run, RunStore, RunWriter
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS
 
+FORMAT = 1  # of saved states
 CORE_PREDICATES = {
     "isHand": 1,
     "isClear": 1,
@@ -86,6 +90,11 @@ class Setting:
         setting = cls(loaded, domain, load_rules(path))
         setting._check_rules()
         return setting
+
+    def fingerprint(self) -> str:
+        """Changes with anything in the files of scene, domain or rules that means something."""
+        parts = [self.scene.model_dump_json(), self.domain.model_dump_json(), repr(self.rules.rules)]
+        return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
     def _check_rules(self) -> None:
         """The predicates that observation fills must be the rules' own; constants must be known things."""
@@ -153,6 +162,16 @@ class RunConfig:
         }
         return asdict(self) | texts | {"events": [str(event) for event in self.events]}
 
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> RunConfig:
+        """The inverse of `to_json`."""
+        parsed = {
+            "noise": NoiseLevels.parse(data["noise"]),
+            "heuristics": Heuristics.parse(data["heuristics"]),
+            "events": tuple(map(OutsideEvent.parse, data["events"])),
+        }
+        return cls(**{**data, **parsed})
+
 
 @dataclass(frozen=True, slots=True)
 class Progress:
@@ -200,7 +219,40 @@ class Session:
         """Do `task`; returns when its goal holds or nothing is left to try."""
         self._world.begin_instruction()
         events, self._events = self._events, ()
-        cycle = PlanningCycle(
+        cycle = self._begin(progress, settings, events)
+        return cycle.run(task.goals, self._environment.observe(), task.alternatives)
+
+    def save(self) -> SavedState:
+        """All that the rest of the present task depends on, as plain data; for use while it goes on."""
+        return {
+            "kind": "session",
+            "format": FORMAT,
+            "environment": self._environment.save(),
+            "world": self._world.to_json(),
+            "rng": save_rng(self._rng),
+            "cycle": self._cycle.state.to_json(),
+        }
+
+    def resume(
+        self,
+        task: Task,
+        saved: SavedState,
+        progress: Progress = Progress(),
+        settings: CycleSettings = CycleSettings(),
+    ) -> EpisodeResult:
+        """Go on with `task` where it was when `saved` was; raises `StateError` if it does not fit."""
+        with restoring(saved, "session", FORMAT):
+            self._environment.restore(saved["environment"])
+            self._world = WorldModel.from_json(saved["world"])
+            self._rng = restore_rng(saved["rng"])
+            state = CycleState.from_json(saved["cycle"], settings.decay)
+        self._events = ()
+        return self._begin(progress, settings).resume(state, task.goals, task.alternatives)
+
+    def _begin(
+        self, progress: Progress, settings: CycleSettings, events: tuple[OutsideEvent, ...] = ()
+    ) -> PlanningCycle:
+        self._cycle = PlanningCycle(
             self._environment,
             self._world,
             self._planner,
@@ -212,7 +264,15 @@ class Session:
             on_act=progress.on_act,
             on_step=progress.on_step,
         )
-        return cycle.run(task.goals, self._environment.observe(), task.alternatives)
+        return self._cycle
+
+
+class RunInterrupted(KeyboardInterrupt):
+    """Ctrl-C while a run goes on that `resume_task` can take up again."""
+
+    def __init__(self, run_id: str) -> None:
+        super().__init__(f"run {run_id} was interrupted")
+        self.run_id = run_id
 
 
 def run_task(
@@ -223,14 +283,62 @@ def run_task(
 ) -> dict[str, Any]:
     """Run one sentence from start to end and keep it in the store; returns the fields of `run --json`.
 
-    Raises a `CogArchError` for anything wrong with the input, before anything is written.
+    Raises a `CogArchError` for anything wrong with the input, before anything is written, and
+    `RunInterrupted` on Ctrl-C.
     """
     started = time.perf_counter()
     setting = Setting.load(config.scene, config.rules, config.events)
-    events = [str(event) for event in setting.scene.events]
     task = setting.understand(sentence)
     manifest = {"instruction": task.instruction, **config.to_json(), **task.to_json()}
-    manifest |= {"events": events, "versions": versions()}
+    manifest |= {"events": [str(event) for event in setting.scene.events], "versions": versions()}
+    manifest |= {"config": config.to_json(), "setting": setting.fingerprint()}
+    with _prepared(task, config, setting) as environment, RunStore(store_folder, create=True) as store:
+        started += _compile(config, progress)
+        name = f"{setting.scene.name}-{config.backend}-{config.seed}"
+        with store.begin(name, manifest) as run:
+            episode = _Episode(config, setting, task, store, run, environment, started)
+            return episode.perform(progress, None)
+
+
+def resume_task(name: str, store_folder: Path, progress: Progress = Progress()) -> dict[str, Any]:
+    """Go on with an interrupted run after its last finished step, as if nothing had happened.
+
+    `name` is as for `RunStore.find`. Returns what `run_task` would have returned; raises `StoreError` for a
+    run that cannot be gone on with.
+    """
+    started = time.perf_counter()
+    with RunStore(store_folder) as store:
+        run = store.find(name)
+        with store.resume(run) as writer:
+            config, setting, task = _as_begun(run)
+            with _prepared(task, config, setting) as environment:
+                started += _compile(config, progress)
+                checkpoint = writer.rewind()
+                after = f"after step {checkpoint.step}" if checkpoint else "from the start"
+                progress.on_notice(f"going on with {run.run_id} {after}")
+                episode = _Episode(config, setting, task, store, writer, environment, started)
+                return episode.perform(progress, checkpoint)
+
+
+def _as_begun(run: Run) -> tuple[RunConfig, Setting, Task]:
+    """Configuration, setting and task of a run; raises `StoreError` if they are not to be had any more."""
+    then, now = run.manifest.get("versions", {}), versions()
+    changed = [key for key in sorted({*then, *now}) if then.get(key) != now.get(key)]
+    again = "it cannot go on exactly as it began; run it anew"
+    if changed or "config" not in run.manifest:
+        old, new = (", ".join(f"{key} {which.get(key)}" for key in changed) for which in (then, now))
+        raise StoreError(
+            f"run {run.run_id} was begun with {old or 'an older version'}, this is {new}: {again}"
+        )
+    config = RunConfig.from_json(run.manifest["config"])
+    setting = Setting.load(config.scene, config.rules, config.events)
+    if setting.fingerprint() != run.manifest["setting"]:
+        raise StoreError(f"scene, domain or rules have changed since run {run.run_id} was begun: {again}")
+    return config, setting, setting.understand(run.manifest["instruction"])
+
+
+@contextmanager
+def _prepared(task: Task, config: RunConfig, setting: Setting) -> Iterator[Environment]:
     environment = make_environment(
         config.backend,
         setting.domain,
@@ -243,48 +351,80 @@ def run_task(
     )
     try:
         _check_skills(task, config.backend, environment)
-        session = Session(config, setting, environment)
-        compiling = time.perf_counter()
-        warm_up(make_planner(config.planner), progress.on_notice)
-        started += time.perf_counter() - compiling  # once on a machine, and no part of the run
-        with RunStore(store_folder, create=True) as store:
-            progress.on_task(task)
-            with store.begin(f"{setting.scene.name}-{config.backend}-{config.seed}", manifest) as run:
-                environment.record_into(run.folder)
-                actions: list[dict[str, Any]] = []
-
-                def on_step(step: Step) -> None:
-                    if step.action is not None:
-                        environment.keep_step(step.number)
-                    record = run.add_step(step)
-                    if step.action is not None:
-                        actions.append(action_record(record))
-                    progress.on_step(step)
-
-                result = session.perform(task, Progress(on_act=progress.on_act, on_step=on_step))
-                artifacts = [str(run.folder / name) for name in environment.save_artifacts()]
-                outcome = result_record(result, speed(result.total))
-                outcome["wall_s"] = round(time.perf_counter() - started, 3)
-                run.finish(outcome | {"artifacts": artifacts})
+        yield environment
     finally:
         environment.close()
-    return {
-        "run_id": run.run_id,
-        "instruction": task.instruction,
-        "scene": setting.scene.name,
-        "backend": config.backend,
-        "seed": config.seed,
-        "planner": config.planner,
-        "heuristics": str(config.heuristics),
-        "noise": str(config.noise),
-        "reach": manifest["reach"],
-        "events": events,
-        **outcome,
-        "subgoals": task.to_json()["subgoals"],
-        "actions": actions,
-        "artifacts": artifacts,
-        "store": str(store_folder),
-    }
+
+
+def _compile(config: RunConfig, progress: Progress) -> float:
+    """Seconds that went into compiling: once on a machine, and no part of the run."""
+    began = time.perf_counter()
+    warm_up(make_planner(config.planner), progress.on_notice)
+    return time.perf_counter() - began
+
+
+@dataclass(frozen=True, slots=True)
+class _Episode:
+    """One run of one task, kept in the store; `started` is when its work began (`time.perf_counter`)."""
+
+    config: RunConfig
+    setting: Setting
+    task: Task
+    store: RunStore
+    run: RunWriter
+    environment: Environment
+    started: float
+
+    def perform(self, progress: Progress, checkpoint: Checkpoint | None) -> dict[str, Any]:
+        """Do the task, or the rest of it; returns the fields of `run --json`."""
+        try:
+            return self._perform(progress, checkpoint)
+        except KeyboardInterrupt:
+            raise RunInterrupted(self.run.run_id) from None
+
+    def _perform(self, progress: Progress, checkpoint: Checkpoint | None) -> dict[str, Any]:
+        session = Session(self.config, self.setting, self.environment)
+        progress.on_task(self.task)
+        spent = 0.0 if checkpoint is None else checkpoint.wall_s
+
+        def wall() -> float:
+            return spent + time.perf_counter() - self.started
+
+        def on_step(step: Step) -> None:
+            state = None  # the last step, which tells how it ended, is done again on resuming
+            if step.action is not None:
+                self.environment.keep_step(step.number)
+                state = session.save()
+            self.run.add_step(step, state, wall())
+            progress.on_step(step)
+
+        listening = Progress(on_act=progress.on_act, on_step=on_step)
+        self.environment.record_into(self.run.folder)
+        if checkpoint is None:
+            result = session.perform(self.task, listening)
+        else:
+            result = session.resume(self.task, checkpoint.state, listening)
+        artifacts = [str(self.run.folder / name) for name in self.environment.save_artifacts()]
+        outcome = result_record(result, speed(result.total)) | {"wall_s": round(wall(), 3)}
+        self.run.finish(outcome | {"artifacts": artifacts})
+        steps = self.store.steps(self.run.run_id)
+        return {
+            "run_id": self.run.run_id,
+            "instruction": self.task.instruction,
+            "scene": self.setting.scene.name,
+            "backend": self.config.backend,
+            "seed": self.config.seed,
+            "planner": self.config.planner,
+            "heuristics": str(self.config.heuristics),
+            "noise": str(self.config.noise),
+            "reach": self.config.to_json()["reach"],
+            "events": [str(event) for event in self.setting.scene.events],
+            **outcome,
+            "subgoals": self.task.to_json()["subgoals"],
+            "actions": [action_record(record) for record in steps if record["action"]],
+            "artifacts": artifacts,
+            "store": str(self.store.folder),
+        }
 
 
 def _check_skills(task: Task, backend: str, environment: Environment) -> None:

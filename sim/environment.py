@@ -132,17 +132,19 @@ class DrakeEnvironment:
             robot.restore(saved["robot"])
             self.world.restore(saved["world"])
         self._robot = robot
-        self.recorder.restart()
+        self.recorder.restart(self._earlier())
         return self.observe()
+
+    def _earlier(self) -> Trajectory | None:
+        """What was recorded of the episode before now, by another process."""
+        path = None if self._folder is None else self._folder / TRAJECTORY
+        return Trajectory.load(path).until(self.world.time) if path and path.exists() else None
 
     def record_into(self, folder: Path) -> None:
         """See `Environment.record_into`."""
         if self._photographer is None:
             return
         self._folder = folder
-        path = folder / TRAJECTORY
-        if path.exists():
-            self.recorder.restart(Trajectory.load(path).until(self.world.time))
 
     def keep_step(self, number: int) -> None:
         """See `Environment.keep_step`."""

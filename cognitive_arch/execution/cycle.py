@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -20,7 +21,7 @@ from cognitive_arch.execution.heuristics import (
 from cognitive_arch.outside import Happening, OutsideEvent, Schedule, told
 from cognitive_arch.planning.base import Planner, PlanResult
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
-from cognitive_arch.relational.symbols import Goal, GroundAction, State, satisfied
+from cognitive_arch.relational.symbols import Goal, GroundAction, State, parse_action, satisfied
 from cognitive_arch.relational.transition import covering_rule
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import Observation
@@ -81,22 +82,55 @@ class EpisodeResult:
 
 
 @dataclass
-class _Progress:
-    """Where in the list of sub-goals the cycle is; everything here is reset with each new list."""
+class CycleState:
+    """All that the cycle knows between two steps, besides the world model and the random generator.
 
-    goals: tuple[Goal, ...]
+    `way` counts the lists of sub-goals: 0 is the task's own, then come its alternatives. `events` have
+    happened since the last step and are told with the next one.
+    """
+
     horizon: int
+    adaptation: Adaptation
+    outside: Schedule
+    way: int = 0
     index: int = 0
     reached: set[int] = field(default_factory=set)
     tried: list[tuple[GroundAction, bool]] = field(default_factory=list)
+    good: int = 0
+    total: int = 0
+    events: list[Event] = field(default_factory=list)
 
-    @property
-    def goal(self) -> Goal:
-        return self.goals[self.index]
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; `from_json` reads it back."""
+        return {
+            "horizon": self.horizon,
+            "failures": [[str(action), n] for action, n in sorted(self.adaptation.failures.items())],
+            "outside": [str(event) for event in self.outside.pending],
+            "way": self.way,
+            "index": self.index,
+            "reached": sorted(self.reached),
+            "tried": [[str(action), worked] for action, worked in self.tried],
+            "good": self.good,
+            "total": self.total,
+            "events": [[str(event.kind), event.why] for event in self.events],
+        }
 
-
-SLIPS = (Happening.EMPTY,)
-MEDDLING = tuple(kind for kind in Happening if kind not in SLIPS)
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any], decay: float) -> CycleState:
+        """The inverse of `to_json`; `decay` is the cycle's."""
+        failures = {parse_action(action): int(n) for action, n in data["failures"]}
+        return cls(
+            horizon=int(data["horizon"]),
+            adaptation=Adaptation(decay, failures),
+            outside=Schedule(map(OutsideEvent.parse, data["outside"])),
+            way=int(data["way"]),
+            index=int(data["index"]),
+            reached=set(map(int, data["reached"])),
+            tried=[(parse_action(action), bool(worked)) for action, worked in data["tried"]],
+            good=int(data["good"]),
+            total=int(data["total"]),
+            events=[Event(EventKind(kind), str(why)) for kind, why in data["events"]],
+        )
 
 
 class PlanningCycle:
@@ -123,7 +157,7 @@ class PlanningCycle:
         self._rng = rng
         self._heuristics = heuristics
         self._settings = settings
-        self._outside = Schedule(outside)
+        self._outside = tuple(outside)
         self._on_act = on_act
         self._on_step = on_step
         self._grounded: dict[tuple[Entity, ...], tuple[GroundRule, ...]] = {}
@@ -135,147 +169,177 @@ class PlanningCycle:
 
         `alternatives` are other lists that mean the same, tried (with creativity) when `goals` fail.
         """
-        self._progress = _Progress(tuple(goals), self._settings.horizon)
-        self._alternatives = [tuple(other) for other in alternatives]
-        self._adaptation = Adaptation(self._settings.decay)
-        good = total = 0
-        events: list[Event] = []
+        self.state = CycleState(
+            self._settings.horizon, Adaptation(self._settings.decay), Schedule(self._outside)
+        )
         self._world.update(observation)
-        state = self._meddle(1, events, tuple(Happening))
+        return self._work(goals, alternatives)
+
+    def resume(
+        self, state: CycleState, goals: Sequence[Goal], alternatives: Sequence[Sequence[Goal]] = ()
+    ) -> EpisodeResult:
+        """Go on with what `run` was called for, after the step that left `state`.
+
+        Environment, world model and generator must be as they were then.
+        """
+        self.state = state
+        return self._work(goals, alternatives)
+
+    def _work(self, goals: Sequence[Goal], alternatives: Sequence[Sequence[Goal]]) -> EpisodeResult:
+        self._ways = (tuple(goals), *map(tuple, alternatives))
         while True:
-            plan, end = self._decide(state, events, total)
-            if end is EndReason.GOAL_REACHED and not self._lasts(events):
-                state = self._world.state
+            before = self._meddle()
+            plan, end = self._decide(before)
+            if end is EndReason.GOAL_REACHED and not self._lasts():
                 continue
             if end is not None:
-                state = self._world.state
-                never = (f"{event}: the run was over before" for event in self._outside.pending)
-                events.extend(Event(EventKind.OUTSIDE, why) for why in never)
-                self._record(total + 1, state, events, plan, None, None, state)
-                return self._result(end, good, total, state)
+                return self._finish(plan, end)
             assert plan is not None
             assert plan.action is not None
-            self._on_act(plan.action)
-            result = self._environment.execute(plan.action)
-            slips: list[Event] = []
-            result = self._slip(total + 2, plan.action, result, slips)
-            after = self._world.update(self._environment.observe())
-            worked = self._judge(plan.action, state, after)
-            total, good = total + 1, good + worked
-            self._record(total, state, events, plan, result, worked, after)
-            self._progress.tried.append((plan.action, worked))
-            events = slips + ([] if worked else self._adapt(plan.action, state))
-            state = self._meddle(total + 1, events)
+            self._act(plan, plan.action, before)
 
-    def _lasts(self, events: list[Event]) -> bool:
+    def _act(self, plan: PlanResult, action: GroundAction, before: WorldState) -> None:
+        """Do the plan's first action, look what came of it, learn from that."""
+        state = self.state
+        so_far, state.events = state.events, []
+        self._on_act(action)
+        result = self._slip(action, self._environment.execute(action))
+        after = self._world.update(self._environment.observe())
+        worked = self._judge(action, before, after)
+        state.total, state.good = state.total + 1, state.good + worked
+        step = self._step(state.total, so_far, before, plan, result, worked, after)
+        state.tried.append((action, worked))
+        if not worked and self._heuristics.adaptability:
+            state.events.append(state.adaptation.record(action, self._ground(before)))
+        self._on_step(step)  # last, so that whoever listens finds all that the next step begins with
+
+    def _finish(self, plan: PlanResult | None, end: EndReason) -> EpisodeResult:
+        """Tell how it ended, as a step without an action."""
+        state, world = self.state, self._world.state
+        never = [f"{event}: the run was over before" for event in state.outside.pending]
+        events = [*state.events, *(Event(EventKind.OUTSIDE, why) for why in never)]
+        self._on_step(self._step(state.total + 1, events, world, plan, None, None, world))
+        return self._result(end, world)
+
+    def _lasts(self) -> bool:
         """Look again after a while: what holds for a moment only (a stack that topples) is not reached."""
         self._environment.settle(self._settings.confirm_seconds)
         state = self._world.update(self._environment.observe()).atoms()
-        lost = [str(literal) for literal in self._progress.goal if not literal.holds(state)]
+        lost = [str(literal) for literal in self._goal if not literal.holds(state)]
         if lost:
-            events.append(Event(EventKind.GOAL_LOST, f"{', '.join(lost)} did not last"))
+            self._tell(EventKind.GOAL_LOST, f"{', '.join(lost)} did not last")
         return not lost
+
+    @property
+    def _goals(self) -> tuple[Goal, ...]:
+        return self._ways[self.state.way]
+
+    @property
+    def _goal(self) -> Goal:
+        return self._goals[self.state.index]
+
+    def _tell(self, kind: EventKind, why: str) -> None:
+        self.state.events.append(Event(kind, why))
 
     # -- what others do -----------------------------------------------------------------------------
 
-    def _slip(self, step: int, action: GroundAction, result: SkillResult, events: list[Event]) -> SkillResult:
-        """Let slip what slips before action `step`: at once, so that it counts against the action just done.
+    def _slip(self, action: GroundAction, result: SkillResult) -> SkillResult:
+        """Let slip what slips before the next action: at once, so that it counts against the one just done.
 
         The robot only sees that its hand is empty after all; it cannot tell why.
         """
-        emptied = self._happen(step, SLIPS, events)
+        emptied = self._happen(self.state.total + 2, (Happening.EMPTY,))
         if result.outcome is Outcome.SUCCESS and emptied & set(action.args):
             return replace(result, outcome=Outcome.FAILURE, reason=FailureReason.SLIPPED)
         return result
 
-    def _meddle(self, step: int, events: list[Event], kinds: Collection[Happening] = MEDDLING) -> WorldState:
-        """Let others meddle before action `step`, and look again if anything changed."""
-        if self._happen(step, kinds, events):
+    def _meddle(self) -> WorldState:
+        """Let others meddle before the next action, and look again if anything changed."""
+        if self._happen(self.state.total + 1, tuple(Happening)):
             return self._world.update(self._environment.observe())
         return self._world.state
 
-    def _happen(self, step: int, kinds: Collection[Happening], events: list[Event]) -> set[str]:
+    def _happen(self, step: int, kinds: Collection[Happening]) -> set[str]:
         """Outside events of these kinds; returns the hands and objects they changed."""
         touched: set[str] = set()
-        for event in self._outside.due(step, kinds):
+        for event in self.state.outside.due(step, kinds):
             changed = self._environment.disturb(event)
-            events.append(Event(EventKind.OUTSIDE, told(event, changed)))
+            self._tell(EventKind.OUTSIDE, told(event, changed))
             touched.update((event.name, *changed) if changed else ())
         return touched
 
     # -- deciding -----------------------------------------------------------------------------------
 
-    def _decide(
-        self, state: WorldState, events: list[Event], total: int
-    ) -> tuple[PlanResult | None, EndReason | None]:
+    def _decide(self, world: WorldState) -> tuple[PlanResult | None, EndReason | None]:
         """Lines 8 to 33 of Algorithm 1: either a plan whose first action is next, or the end."""
         plan: PlanResult | None = None
+        state = self.state
         while True:
-            self._maintain_goals(state.atoms(), events)
-            progress = self._progress
-            if satisfied(progress.goal, state.atoms()):
-                events.append(Event(EventKind.SUBGOAL_REACHED, f"sub-goal {progress.index + 1} holds"))
-                progress.reached.add(progress.index)
-                if progress.index == len(progress.goals) - 1:
+            self._maintain_goals(world.atoms())
+            if satisfied(self._goal, world.atoms()):
+                self._tell(EventKind.SUBGOAL_REACHED, f"sub-goal {state.index + 1} holds")
+                state.reached.add(state.index)
+                if state.index == len(self._goals) - 1:
                     return None, EndReason.GOAL_REACHED
-                self._move_to(progress.index + 1)
-                self._adaptation.reset()
-                progress.tried.clear()
+                self._move_to(state.index + 1)
+                state.adaptation.reset()
+                state.tried.clear()
                 continue
-            if total >= self._settings.max_actions:
+            if state.total >= self._settings.max_actions:
                 return None, EndReason.ACTION_LIMIT
-            rules = self._adaptation.apply(self._ground(state))
-            plan = self._planner.plan(state.atoms(), progress.goal, rules, progress.horizon, self._rng)
+            rules = state.adaptation.apply(self._ground(world))
+            plan = self._planner.plan(world.atoms(), self._goal, rules, state.horizon, self._rng)
             if plan.action is not None:
                 return plan, None
-            if progress.horizon < self._settings.max_horizon:
-                progress.horizon += 1
-                why = f"no plan within {progress.horizon - 1} actions: looking {progress.horizon} ahead"
-                events.append(Event(EventKind.HORIZON_EXTENDED, why))
-            elif not self._another_way(events):
-                gone = absent_entities(progress.goal, [e.name for e in state.entities])
+            if state.horizon < self._settings.max_horizon:
+                state.horizon += 1
+                why = f"no plan within {state.horizon - 1} actions: looking {state.horizon} ahead"
+                self._tell(EventKind.HORIZON_EXTENDED, why)
+            elif not self._another_way():
+                gone = absent_entities(self._goal, [e.name for e in world.entities])
                 return plan, EndReason.MISSING_OBJECT if gone else EndReason.NO_PLAN
 
-    def _maintain_goals(self, state: State, events: list[Event]) -> None:
+    def _maintain_goals(self, atoms: State) -> None:
         """Step back while something that was reached, and is still asked for, has been undone.
 
         Only sub-goals that were reached count: one that creativity skipped was never true, and stepping
         back to it would undo the jump for ever.
         """
-        progress = self._progress
+        state = self.state
         while self._heuristics.goal_maintenance:
-            last = max((i for i in progress.reached if i < progress.index), default=None)
+            last = max((i for i in state.reached if i < state.index), default=None)
             if last is None:
                 return
-            lost = undone(progress.goals[last], progress.goal, state)
+            lost = undone(self._goals[last], self._goal, atoms)
             if not lost:
                 return
             why = f"{', '.join(map(str, lost))} no longer holds: back to sub-goal {last + 1}"
-            events.append(Event(EventKind.GOAL_MAINTENANCE, why))
-            progress.reached.discard(last)
+            self._tell(EventKind.GOAL_MAINTENANCE, why)
+            state.reached.discard(last)
             self._move_to(last)
 
-    def _another_way(self, events: list[Event]) -> bool:
+    def _another_way(self) -> bool:
         """Creativity: skip a sub-goal that cannot be planned for, or let the other hand try."""
-        progress = self._progress
+        state = self.state
         if not self._heuristics.creativity:
             return False
-        if progress.index < len(progress.goals) - 1:
-            why = f"no plan for sub-goal {progress.index + 1}: trying sub-goal {progress.index + 2} directly"
-            events.append(Event(EventKind.CREATIVITY, why))
-            self._move_to(progress.index + 1)
+        if state.index < len(self._goals) - 1:
+            why = f"no plan for sub-goal {state.index + 1}: trying sub-goal {state.index + 2} directly"
+            self._tell(EventKind.CREATIVITY, why)
+            self._move_to(state.index + 1)
             return True
-        if self._alternatives:
+        if state.way < len(self._ways) - 1:
             why = "no plan for the last sub-goal: nobody said which hand, so the other one may try"
-            events.append(Event(EventKind.OTHER_HAND, why))
-            tried = progress.tried
-            self._progress = _Progress(self._alternatives.pop(0), self._settings.horizon, tried=tried)
+            self._tell(EventKind.OTHER_HAND, why)
+            state.way += 1
+            state.reached.clear()
+            self._move_to(0)
             return True
         return False
 
     def _move_to(self, index: int) -> None:
-        self._progress.index = index
-        self._progress.horizon = self._settings.horizon
+        self.state.index = index
+        self.state.horizon = self._settings.horizon
 
     # -- learning from what happened ----------------------------------------------------------------
 
@@ -289,58 +353,50 @@ class PlanningCycle:
         rule = covering_rule(self._ground(before), action, before.atoms())
         return action_worked(rule, before.atoms(), after.atoms())
 
-    def _adapt(self, action: GroundAction, state: WorldState) -> list[Event]:
-        if not self._heuristics.adaptability:
-            return []
-        return [self._adaptation.record(action, self._ground(state))]
-
     # -- telling ------------------------------------------------------------------------------------
 
-    def _record(
+    def _step(
         self,
         number: int,
+        events: Sequence[Event],
         before: WorldState,
-        events: list[Event],
         plan: PlanResult | None,
         result: SkillResult | None,
         worked: bool | None,
         after: WorldState,
-    ) -> None:
+    ) -> Step:
         reason = FailureReason.NONE
         if result is not None and not worked:
             changed = before.atoms() != after.atoms()
             reason = result.reason
             if reason is FailureReason.NONE:
                 reason = FailureReason.UNEXPECTED_EFFECT if changed else FailureReason.NO_EFFECT
-        self._on_step(
-            Step(
-                number=number,
-                before=before,
-                subgoal=self._progress.index + 1,
-                goal=self._progress.goal,
-                horizon=self._progress.horizon,
-                events=tuple(events),
-                plan=plan,
-                action=plan.action if plan and result is not None else None,
-                outcome=None if worked is None else Outcome.SUCCESS if worked else Outcome.FAILURE,
-                reason=reason,
-                effect=dict(sorted(result.effect.items())) if result else {},
-                after=after,
-            )
+        return Step(
+            number=number,
+            before=before,
+            subgoal=self.state.index + 1,
+            goal=self._goal,
+            horizon=self.state.horizon,
+            events=tuple(events),
+            plan=plan,
+            action=plan.action if plan and result is not None else None,
+            outcome=None if worked is None else Outcome.SUCCESS if worked else Outcome.FAILURE,
+            reason=reason,
+            effect=dict(sorted(result.effect.items())) if result else {},
+            after=after,
         )
 
-    def _result(self, end: EndReason, good: int, total: int, state: WorldState) -> EpisodeResult:
-        progress = self._progress
-        report = None
+    def _result(self, end: EndReason, world: WorldState) -> EpisodeResult:
+        state, report = self.state, None
         if end is not EndReason.GOAL_REACHED:
             report = explain_failure(
                 end,
-                progress.index + 1,
-                progress.goal,
-                state.atoms(),
-                self._ground(state),
-                progress.tried,
-                progress.horizon,
-                absent_entities(progress.goal, [entity.name for entity in state.entities]),
+                state.index + 1,
+                self._goal,
+                world.atoms(),
+                self._ground(world),
+                state.tried,
+                state.horizon,
+                absent_entities(self._goal, [entity.name for entity in world.entities]),
             )
-        return EpisodeResult(report is None, end, good, total, report, state)
+        return EpisodeResult(report is None, end, state.good, state.total, report, world)

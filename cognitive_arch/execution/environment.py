@@ -115,8 +115,8 @@ class Environment(Protocol):
     def record_into(self, folder: Path) -> None:
         """Keep what can be kept of the episode (pictures, trajectory) in `folder` from now on.
 
-        What `folder` holds of the same episode up to now, from before a `restore`, is taken up. Does
-        nothing in an environment that was not built to record.
+        A later `restore` takes up what `folder` holds of the same episode up to that time. Does nothing
+        in an environment that was not built to record.
         """
         ...
 

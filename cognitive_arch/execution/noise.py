@@ -25,7 +25,7 @@ class NoiseLevels:
                 raise ConfigError(f"noise level {name}={level:g} is out of range; valid: 0 to 1")
 
     def __str__(self) -> str:
-        return ",".join(f"{name}={level:g}" for name, level in asdict(self).items())
+        return ",".join(f"{name}={_shortest(level)}" for name, level in asdict(self).items())
 
     def __bool__(self) -> bool:
         return any(asdict(self).values())
@@ -57,6 +57,11 @@ class NoiseLevels:
         if capability == "arm":
             capability = "left" if "LeftHand" in action.args else "right"
         return float(asdict(self)[capability])
+
+
+def _shortest(level: float) -> str:
+    """The number as people write it, and exactly."""
+    return next(text for text in (f"{level:g}", repr(level)) if float(text) == level)
 
 
 def _level(text: str) -> float:

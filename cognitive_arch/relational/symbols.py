@@ -97,6 +97,14 @@ def parse_literal(text: str) -> Literal:
     return Literal(Atom(predicate, names), sign is None)
 
 
+def parse_action(text: str) -> GroundAction:
+    """Read `graspWith(Ham,LeftHand)`, the inverse of `str`; raises `ValueError` on anything else."""
+    literal = parse_literal(text)
+    if not literal.positive:
+        raise ValueError(f"not an action: '{text}'")
+    return GroundAction(literal.atom.predicate, literal.atom.args)
+
+
 def satisfied(goal: Goal, state: State) -> bool:
     """Whether every literal of `goal` is true in `state`."""
     return all(literal.holds(state) for literal in goal)

@@ -1,8 +1,10 @@
 """The run store: one SQLite file (WAL) per store folder, one transaction per step, one folder per run.
 
-A process killed at any instant loses at most the step in flight. While a run goes on, its process holds a
-lock on `<run>/.lock`; the operating system lets go of it however the process ends, so a run without result
-whose lock is free was interrupted.
+A process killed at any instant loses at most the step in flight. With each step goes a checkpoint, from
+which the run can be taken up again; only the latest is kept, and none once the run is finished.
+
+While a run goes on, its process holds a lock on `<run>/.lock`; the operating system lets go of it however
+the process ends, so a run without result whose lock is free was interrupted.
 """
 
 from __future__ import annotations
@@ -39,6 +41,13 @@ CREATE TABLE IF NOT EXISTS steps (
     record TEXT NOT NULL,
     PRIMARY KEY (run_id, step)
 ) WITHOUT ROWID;
+CREATE TABLE IF NOT EXISTS checkpoints (
+    run_id TEXT PRIMARY KEY,
+    step INTEGER NOT NULL,
+    version INTEGER NOT NULL,
+    wall_s REAL NOT NULL,
+    state TEXT NOT NULL
+) WITHOUT ROWID;
 """
 
 
@@ -61,6 +70,17 @@ class Run:
     manifest: dict[str, Any]
     result: dict[str, Any] | None
     folder: Path
+
+
+@dataclass(frozen=True, slots=True)
+class Checkpoint:
+    """Where a run was after `step`: `state` is all that the rest depends on, as plain data, `version` that
+    of its latest world state, `wall_s` the time it had taken."""
+
+    step: int
+    version: int
+    wall_s: float
+    state: dict[str, Any]
 
 
 class RunStore:
@@ -110,6 +130,36 @@ class RunStore:
                 )
             return RunWriter(self, run_id, lock)
         raise StoreError(f"cannot find a free run id for {stem}")
+
+    def resume(self, run: Run) -> RunWriter:
+        """The writer of a run that was interrupted, to be rewound to its checkpoint.
+
+        Raises `StoreError` for a run that goes on or is finished.
+        """
+        try:
+            lock = (run.folder / ".lock").open("a")
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise StoreError(f"run {run.run_id} is still running") from None
+        except OSError as error:
+            raise StoreError(f"cannot write to run {run.run_id}: {one_line(error, 200)}") from None
+        # Somebody else may have finished it since `run` was read.
+        status = self.find(run.run_id).status
+        if status in (RunStatus.SUCCESS, RunStatus.FAILURE):
+            lock.close()
+            raise StoreError(f"run {run.run_id} is finished ({status}): there is nothing to go on with")
+        return RunWriter(self, run.run_id, lock)
+
+    def checkpoint(self, run_id: str) -> Checkpoint | None:
+        """Where a run can be taken up; None if no step is finished, or the run is."""
+        rows = self._query("SELECT step, version, wall_s, state FROM checkpoints WHERE run_id = ?", run_id)
+        if not rows:
+            return None
+        step, version, wall_s, state = rows[0]
+        try:
+            return Checkpoint(int(step), int(version), float(wall_s), json.loads(state))
+        except ValueError:
+            raise StoreError(f"the checkpoint of run {run_id} cannot be read") from None
 
     def _claim(self, run_id: str) -> TextIO | None:
         """The locked lock file of a new run folder, or None if somebody else has that id."""
@@ -202,17 +252,36 @@ class RunWriter:
         self._lock = lock
         self._version = -1
 
-    def add_step(self, step: Step) -> dict[str, Any]:
-        """Write one step and the world states it brought, in one transaction; returns its record."""
+    def add_step(
+        self, step: Step, state: dict[str, Any] | None = None, wall_s: float = 0.0
+    ) -> dict[str, Any]:
+        """Write one step and the world states it brought, in one transaction; returns its record.
+
+        `state` becomes the run's checkpoint; without it the earlier one stays.
+        """
         record = step_record(step)
         with self._store._transaction():
-            for state in (step.before, step.after):
-                self._add_world(state)
+            for world in (step.before, step.after):
+                self._add_world(world)
             self._store._db.execute(
                 "INSERT INTO steps VALUES (?, ?, ?)",
                 (self.run_id, step.number, json.dumps(record, sort_keys=True)),
             )
+            if state is not None:
+                self._store._db.execute(
+                    "INSERT OR REPLACE INTO checkpoints VALUES (?, ?, ?, ?, ?)",
+                    (self.run_id, step.number, self._version, wall_s, json.dumps(state)),
+                )
         return record
+
+    def rewind(self) -> Checkpoint | None:
+        """Take back what was written after the checkpoint (how the run ended, but not yet its result)."""
+        checkpoint = self._store.checkpoint(self.run_id)
+        step, self._version = (checkpoint.step, checkpoint.version) if checkpoint else (0, -1)
+        with self._store._transaction():
+            self._store._db.execute("DELETE FROM steps WHERE run_id = ? AND step > ?", (self.run_id, step))
+            self._store.worlds.forget_after(self.run_id, self._version)
+        return checkpoint
 
     def _add_world(self, state: WorldState) -> None:
         if state.version > self._version:
@@ -226,6 +295,7 @@ class RunWriter:
                 "UPDATE runs SET result = ? WHERE run_id = ?",
                 (json.dumps(result, sort_keys=True), self.run_id),
             )
+            self._store._db.execute("DELETE FROM checkpoints WHERE run_id = ?", (self.run_id,))
 
     def close(self) -> None:
         """Let go of the run's lock."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 from cognitive_arch.world.observation import ObjectObservation, Observation
 from cognitive_arch.world.state import HandEntity, ObjectEntity, WorldState
@@ -54,6 +55,18 @@ class WorldModel:
             properties=tuple(sorted(observation.properties)),
         )
         return self._state
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; `from_json` reads it back."""
+        return {"ids": self._ids, "state": self._state.to_json() if self._state else None}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> WorldModel:
+        """The inverse of `to_json`."""
+        model = cls()
+        model._ids = {str(name): int(n) for name, n in data["ids"].items()}
+        model._state = WorldState.from_json(data["state"]) if data["state"] else None
+        return model
 
     def _anchor(self, seen: ObjectObservation, holder: Mapping[str, str]) -> ObjectEntity:
         return ObjectEntity(

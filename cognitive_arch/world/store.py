@@ -33,6 +33,12 @@ class WorldStateStore:
             (run_id, state.version, state.time, json.dumps(state.to_json(), sort_keys=True)),
         )
 
+    def forget_after(self, run_id: str, version: int) -> None:
+        """Remove the versions of a run beyond `version`."""
+        self._connection.execute(
+            "DELETE FROM world_states WHERE run_id = ? AND version > ?", (run_id, version)
+        )
+
     def get(self, run_id: str, version: int) -> WorldState:
         """One version; raises `StoreError` naming the versions there are."""
         row = self._connection.execute(

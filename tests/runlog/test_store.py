@@ -138,10 +138,11 @@ def test_ctrl_c_says_what_is_kept(tmp_path: Path) -> None:
         [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
     )
     assert done.returncode == 130
-    assert done.stderr.strip().endswith("interrupted; finished steps are kept, see: cogarch inspect")
     assert "Traceback" not in done.stderr
     with RunStore(tmp_path) as store:
         (run,) = store.runs()
+        command = f"cogarch run --resume {run.run_id} --store ."
+        assert done.stderr.splitlines()[-1] == f"interrupted; finished steps are kept, go on with: {command}"
         assert run.status is RunStatus.INTERRUPTED
         assert len(store.steps(run.run_id)) == 1
 
