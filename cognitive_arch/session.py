@@ -295,6 +295,7 @@ def run_task(
     with _prepared(task, config, setting) as environment, RunStore(store_folder, create=True) as store:
         started += _compile(config, progress)
         name = f"{setting.scene.name}-{config.backend}-{config.seed}"
+        manifest["physical_noise"] = list(environment.noise_told)
         with store.begin(name, manifest) as run:
             episode = _Episode(config, setting, task, store, run, environment, started)
             return episode.perform(progress, None)
@@ -385,6 +386,8 @@ class _Episode:
     def _perform(self, progress: Progress, checkpoint: Checkpoint | None) -> dict[str, Any]:
         session = Session(self.config, self.setting, self.environment)
         progress.on_task(self.task)
+        for line in self.environment.noise_told:
+            progress.on_notice(f"noise        {line}")
         spent = 0.0 if checkpoint is None else checkpoint.wall_s
 
         def wall() -> float:
@@ -418,6 +421,7 @@ class _Episode:
             "heuristics": str(self.config.heuristics),
             "noise": str(self.config.noise),
             "reach": self.config.to_json()["reach"],
+            "physical_noise": list(self.environment.noise_told),
             "events": [str(event) for event in self.setting.scene.events],
             **outcome,
             "subgoals": self.task.to_json()["subgoals"],

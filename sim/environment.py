@@ -15,9 +15,10 @@ from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
 from sim.meddling import disturb
+from sim.noise import EpisodeNoise, PhysicalNoise
 from sim.pictures import Photographer
 from sim.recorder import Recorder
-from sim.robot import AimNoise, Robot
+from sim.robot import Robot
 from sim.scenario import FRICTION
 from sim.skills import SKILLS
 from sim.skills.base import let_go_of_lost, unusable_arguments
@@ -30,8 +31,8 @@ FORMAT = 1  # of saved states
 class DrakeEnvironment:
     """A simulated iCub at a table; see `Environment`.
 
-    `noise` maps `left` and `right` to noise levels: an arm of level n misses its aim by a Gaussian of
-    n * 4 cm in x and y. `record` makes pictures, a trajectory and a Meshcat recording of an episode.
+    `noise` maps `left`, `right`, `pull` and `push` to noise levels, or is a composition of its own.
+    `record` makes pictures, a trajectory and a Meshcat recording of an episode.
     `reach` is `kinematic`, or `published` for the constants of the scene.
     """
 
@@ -42,7 +43,7 @@ class DrakeEnvironment:
         domain: Domain,
         scene: Scene,
         *,
-        noise: Mapping[str, float] | None = None,
+        noise: Mapping[str, float] | PhysicalNoise | None = None,
         jitter: float = 0.0,
         record: bool = False,
         friction: float = FRICTION,
@@ -50,7 +51,8 @@ class DrakeEnvironment:
     ) -> None:
         self._domain = domain
         self._scene = scene
-        self._noise = AimNoise(dict(noise or {}))
+        self._noise = noise if isinstance(noise, PhysicalNoise) else PhysicalNoise(dict(noise or {}))
+        self.noise_told = self._noise.told()
         self._jitter = jitter
         self._reach = scene.reach if reach == "published" else None
         self.world = World(domain, scene, record=record, friction=friction)
@@ -72,6 +74,7 @@ class DrakeEnvironment:
         self.world.reset(jittered(self._scene, self._jitter, rng, self._domain))
         self.recorder.restart()
         self._robot = self._new_robot(rng)
+        self._robot.noise.begin()
         if self._photographer:
             self._photographer.start()
         self.world.hold(SETTLE)
@@ -80,7 +83,8 @@ class DrakeEnvironment:
         return self.observe()
 
     def _new_robot(self, rng: np.random.Generator) -> Robot:
-        return Robot(self._domain, self._scene, self.world, self._noise, rng, reach=self._reach)
+        noise = EpisodeNoise(self._noise, self.world, rng)
+        return Robot(self._domain, self._scene, self.world, noise, rng, reach=self._reach)
 
     def observe(self) -> Observation:
         """See `Environment.observe`."""
@@ -131,6 +135,7 @@ class DrakeEnvironment:
             robot = self._new_robot(rng)
             robot.restore(saved["robot"])
             self.world.restore(saved["world"])
+            robot.noise.take_effect()
         self._robot = robot
         self.recorder.restart(self._earlier())
         return self.observe()

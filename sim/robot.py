@@ -21,6 +21,7 @@ from sim.kinematics import (
     fingertip,
     palm_axis,
 )
+from sim.noise import EpisodeNoise
 from sim.perception import OraclePerception
 from sim.world import Joints, World
 
@@ -29,25 +30,6 @@ YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing di
 CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may be moved meanwhile
 TOOL_TILT, TOOL_TURN = 0.06, 0.15  # rad, the same for a hand with a tool
 TRANSIT_SPEED = 0.9  # rad/s of the fastest joint between poses
-
-
-@dataclass(frozen=True)
-class AimNoise:
-    """An arm's error of aim: Gaussian, independent in x and y, `scale` metres at noise level 1."""
-
-    levels: Mapping[str, float]
-    scale: float = 0.04
-
-    def __str__(self) -> str:
-        sigmas = ", ".join(f"{arm} {1000 * self.scale * v:.1f} mm" for arm, v in sorted(self.levels.items()))
-        return f"aim off by a Gaussian of {sigmas} in x and y"
-
-    def draw(self, hand: str, rng: np.random.Generator) -> Vector:
-        """One error, metres, (3,); draws nothing when the arm is perfect."""
-        level = self.levels.get("left" if hand == "LeftHand" else "right", 0.0)
-        if level <= 0:
-            return np.zeros(3)
-        return np.append(rng.normal(0.0, self.scale * level, 2), 0.0)
 
 
 @dataclass
@@ -82,7 +64,7 @@ class Robot:
     domain: Domain
     scene: Scene
     world: World
-    noise: AimNoise
+    noise: EpisodeNoise
     rng: np.random.Generator
     grips: dict[str, Grip] = field(default_factory=dict)
     reach: ReachLimits | None = None
@@ -93,11 +75,15 @@ class Robot:
 
     def save(self) -> dict[str, Any]:
         """What the robot remembers from one action to the next, as plain data."""
-        return {"grips": {hand: grip.to_json() for hand, grip in sorted(self.grips.items())}}
+        return {
+            "grips": {hand: grip.to_json() for hand, grip in sorted(self.grips.items())},
+            "noise": self.noise.save(),
+        }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """The inverse of `save`."""
         self.grips = {hand: Grip.from_json(grip) for hand, grip in saved["grips"].items()}
+        self.noise.restore(saved["noise"])
 
     def top_of(self, name: str) -> float:
         """Height of an object's upper face, metres."""

@@ -7,13 +7,22 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizer, MeshcatVisualizerParams, Role
+from pydrake.geometry import (
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    ProximityProperties,
+    Role,
+    RoleAssign,
+)
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.plant import CoulombFriction
 from pydrake.systems.analysis import Simulator
 
 from cognitive_arch.domain import Domain, Placement, Scene
-from sim.hands import SIDES, STROKE, finger_names
+from sim.hands import FINGER_FRICTION, SIDES, STROKE, finger_names
 from sim.scenario import FRICTION, Scenario, build_scenario, resist_rolling
 
 Joints = NDArray[np.float64]
@@ -64,6 +73,10 @@ class World:
         self.home = np.array([HOME.get(n, STROKE if "finger" in n else 0.0) for n in self.joint_names])
         self.command = self.home.copy()
         self.set_point = self.command  # what the controllers are being asked for at this moment
+        self.on_send: Callable[[Joints, Joints], Joints] | None = (
+            None  # what becomes of a set point on its way
+        )
+        self._friction: dict[str, float] = {}
         self.on_tick: Callable[[], None] = lambda: None
         self._seen_contacts: tuple[float, frozenset[tuple[str, str]]] | None = None
 
@@ -94,6 +107,7 @@ class World:
             x, y = placements[name].position
             z = self.scene.table.height + self.height(name) / 2 + 0.0005
             self.place(name, RigidTransform(RollPitchYaw(0, 0, placements[name].yaw), [x, y, z]))
+        self.on_send = None
         self._send(self.home, np.zeros(len(self.home)))
         self.command = self.home.copy()
         self.simulator.Initialize()
@@ -192,15 +206,19 @@ class World:
             # Locking stops a body, so positions and velocities come after it.
             (body.Lock if name in locked else body.Unlock)(context)
         plant.SetPositionsAndVelocities(context, state)
-        self._send(desired[:n], desired[n:])
-        self.command = command
+        self._ask(desired[:n], desired[n:])
+        self.set_point = self.command = command
         self._seen_contacts = time, frozenset(contacts | {(b, a) for a, b in contacts})
         self.simulator.Initialize()
 
     # -- moving -------------------------------------------------------------------------------------
 
     def _send(self, position: Joints, velocity: Joints) -> None:
-        self.set_point = position
+        change, self.set_point = position - self.set_point, position
+        arriving = position if self.on_send is None else self.on_send(position, change)
+        self._ask(arriving, velocity)
+
+    def _ask(self, position: Joints, velocity: Joints) -> None:
         self._desired.FixValue(self._plant_context, np.concatenate([position, velocity]))
 
     def follow(self, waypoints: Sequence[Joints], seconds: float) -> None:
@@ -239,6 +257,26 @@ class World:
     def fingers(self, joints: Joints, hand: str) -> Joints:
         """The two finger positions of `hand` within `joints`, metres."""
         return joints[self._fingers[hand]]
+
+    def arm_joints(self, hand: str) -> list[int]:
+        """Where the arm's own joints (without torso and fingers) are within a joint vector."""
+        starts = tuple(f"{SIDES[hand]}_{part}" for part in ("shoulder", "elbow", "wrist"))
+        return [i for i, name in enumerate(self.joint_names) if name.startswith(starts)]
+
+    def set_finger_friction(self, hand: str, factor: float) -> None:
+        """Let the fingers of a hand have that part of their friction; free of cost where nothing changes."""
+        if self._friction.get(hand, 1.0) == factor:
+            return
+        self._friction[hand] = factor
+        graph, friction = self.scenario.scene_graph, FINGER_FRICTION * factor
+        context = graph.GetMyMutableContextFromRoot(self._context)
+        for name in finger_names(SIDES[hand]):
+            for geometry in self.plant.GetCollisionGeometriesForBody(self.plant.GetBodyByName(name)):
+                properties = ProximityProperties(graph.model_inspector().GetProximityProperties(geometry))
+                properties.UpdateProperty("material", "coulomb_friction", CoulombFriction(friction, friction))
+                graph.AssignRole(
+                    context, self.plant.get_source_id(), geometry, properties, RoleAssign.kReplace
+                )
 
     def move_fingers(self, hand: str, opening: float, seconds: float = 0.4) -> None:
         """Open or close a hand."""

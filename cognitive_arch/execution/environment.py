@@ -72,6 +72,9 @@ class Environment(Protocol):
     skills: frozenset[str]
     """Names of the actions this environment can perform, e.g. `graspWith`."""
 
+    noise_told: tuple[str, ...]
+    """What noise is injected, one line each with units; none without noise."""
+
     def reset(self, seed: int) -> Observation:
         """Set the scene up anew and look at it."""
         ...

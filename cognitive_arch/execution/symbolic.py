@@ -69,6 +69,11 @@ class SymbolicEnvironment:
 
     def __post_init__(self) -> None:
         self.skills = frozenset(rule.action for rule in self.rules.rules)
+        self.noise_told = tuple(
+            f"{capability}: an action fails with probability {level:g} and then changes nothing"
+            for capability, level in asdict(self.noise).items()
+            if level > 0
+        )
         self._rng = np.random.default_rng(0)
         self._ground: tuple[GroundRule, ...] = ()
 

@@ -31,11 +31,12 @@ def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     obstacle = _obstacle(robot, name, hand)
     if obstacle is not None:
         return obstacle
-    aim = robot.noise.draw(hand, robot.rng)
+    aim = robot.noise.aim(hand)
     width, yaws = grip_choices(robot, name)
     # A tool is a lever that wants to turn in the hand: the fingers press on it as hard as they can.
-    squeeze = FIRM_SQUEEZE if robot.domain.objects[name].shape.type == "tool" else SQUEEZE
-    closed = width / 2 - squeeze if squeeze > SQUEEZE else max(0.0, width / 2 - squeeze)
+    is_tool = robot.domain.objects[name].shape.type == "tool"
+    squeeze = (FIRM_SQUEEZE if is_tool else SQUEEZE) * robot.noise.grip(hand)
+    closed = width / 2 - squeeze if is_tool else max(0.0, width / 2 - squeeze)
     grip = Grip(min(STROKE, width / 2 + MARGIN), closed, yaws, robot.world.home)
     plan = _plan(robot, name, hand, grip, aim)
     if plan is None:

@@ -47,6 +47,7 @@ def pull(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     tool = held_tool(robot, name, hand)
     if tool is None or tool.shape.bar <= 0:
         return FailureReason.CANNOT_PULL
+    tool = tool.with_head_off(robot.noise.head("pull"))
     motion = first_feasible(robot, tool, _sweeps(robot, tool, obj))
     return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
 

@@ -42,6 +42,7 @@ def push(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     tool = held_tool(robot, name, hand)
     if tool is None:
         return FailureReason.NOT_A_TOOL
+    tool = tool.with_head_off(robot.noise.head("push"))
     motion = first_feasible(robot, tool, _sweeps(robot, tool, obj))
     return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
 

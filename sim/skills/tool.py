@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
@@ -71,6 +71,11 @@ class HeldTool:
             fingers_W,
             YAW_TOLERANCE,
         )
+
+    def with_head_off(self, error: Vector) -> HeldTool:
+        """The tool as the robot takes it to be whose head will be off by `error`: along the shaft, across it,
+        up; metres."""
+        return replace(self, X_HT=self.X_HT @ RigidTransform(-error))
 
     def covers(self, head: Point, yaw: float, pitch: float) -> list[tuple[Capsule, float]]:
         """What tool and finger tips cover of the table with the head there, each with the height of its
