@@ -54,8 +54,8 @@ class ArmPart(ABC):
     def begin(self, level: float, arm: ArmState, n_joints: int, rng: np.random.Generator) -> None:  # noqa: B027
         """Draw what holds for an episode; most parts draw nothing."""
 
-    def aim(self, level: float, rng: np.random.Generator) -> Vector:
-        """Error of where one grasp or put goes, metres, (2,)."""
+    def aim(self, level: float, verb: str, rng: np.random.Generator) -> Vector:
+        """Error of where one `grasp` or `put` goes, metres, (2,)."""
         return np.zeros(2)
 
     def grip(self, level: float, rng: np.random.Generator) -> float:
@@ -83,17 +83,18 @@ class ToolPart(ABC):
 
 @dataclass(frozen=True)
 class AimError(ArmPart):
-    """The hand goes elsewhere, anew for every grasp and put: Gaussian in x and y, such that it is off by
-    more than `tolerance` metres with a probability that is the level."""
+    """The hand goes elsewhere, anew every time: Gaussian in x and y, such that it is off by more than what
+    a `grasp` or a `put` tolerates (metres) with a probability that is the level."""
 
-    tolerance: float
+    grasp: float
+    put: float
 
     def told(self, level: float) -> str:
-        sigma = 1000 * spread(level, self.tolerance)
-        return f"aim off by a Gaussian of {sigma:.1f} mm in x and y, anew for every grasp and put"
+        grasp, put = (1000 * spread(level, tolerance) for tolerance in (self.grasp, self.put))
+        return f"aim off by a Gaussian of {grasp:.1f} mm (grasp) or {put:.1f} mm (put) in x and y, every time"
 
-    def aim(self, level: float, rng: np.random.Generator) -> Vector:
-        return rng.normal(0.0, spread(level, self.tolerance), 2)
+    def aim(self, level: float, verb: str, rng: np.random.Generator) -> Vector:
+        return rng.normal(0.0, spread(level, self.grasp if verb == "grasp" else self.put), 2)
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,7 @@ class SightError(ArmPart):
             f"objects seen off by a Gaussian of {1000 * level * self.sigma:.1f} mm in x and y, at every look"
         )
 
-    def aim(self, level: float, rng: np.random.Generator) -> Vector:
+    def aim(self, level: float, verb: str, rng: np.random.Generator) -> Vector:
         return rng.normal(0.0, level * self.sigma, 2)
 
 
@@ -231,16 +232,16 @@ class PhysicalNoise:
 
     levels: Mapping[str, float]
     arm: tuple[ArmPart, ...] = (
-        AimError(tolerance=0.024),
+        AimError(grasp=0.018, put=0.024),
         SightError(sigma=0.006),
         Calibration(sigma=0.006),
         Backlash(width=0.008),
         ActuatorNoise(sigma=0.002),
         SlipperyFingers(loss=0.5),
-        WeakGrip(power=2.0),
+        WeakGrip(power=1.5),
     )
-    pull: tuple[ToolPart, ...] = (HeadError(tolerance=0.024), HeadLift(sigma=0.008))
-    push: tuple[ToolPart, ...] = (HeadError(tolerance=0.024), HeadLift(sigma=0.008))
+    pull: tuple[ToolPart, ...] = (HeadError(tolerance=0.014), HeadLift(sigma=0.008))
+    push: tuple[ToolPart, ...] = (HeadError(tolerance=0.030), HeadLift(sigma=0.020))
 
     def level(self, capability: str) -> float:
         """The level of `left`, `right`, `pull` or `push`."""
@@ -302,12 +303,12 @@ class EpisodeNoise:
     def _level(self, hand: str) -> float:
         return self._noise.level(_capability(hand))
 
-    def aim(self, hand: str) -> Vector:
-        """How far the next grasp or put goes wrong, metres, (3,)."""
+    def aim(self, hand: str, verb: str) -> Vector:
+        """How far the next `grasp` or `put` goes wrong, metres, (3,)."""
         error = np.zeros(3)
         if hand in self._arms:
             for part in self._noise.arm:
-                error[:2] += part.aim(self._level(hand), self._rng)
+                error[:2] += part.aim(self._level(hand), verb, self._rng)
         return error
 
     def grip(self, hand: str) -> float:

@@ -31,7 +31,7 @@ def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     obstacle = _obstacle(robot, name, hand)
     if obstacle is not None:
         return obstacle
-    aim = robot.noise.aim(hand)
+    aim = robot.noise.aim(hand, "grasp")
     width, yaws = grip_choices(robot, name)
     # A tool is a lever that wants to turn in the hand: the fingers press on it as hard as they can.
     is_tool = robot.domain.objects[name].shape.type == "tool"

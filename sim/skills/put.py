@@ -26,7 +26,7 @@ def put_on(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         return FailureReason.COVERED
     p_WT = robot.world.pose(target).translation()
     place = np.array([p_WT[0], p_WT[1], robot.top_of(target) + robot.world.height(name) / 2])
-    reason = set_down(robot, hand, place + robot.noise.aim(hand))
+    reason = set_down(robot, hand, place + robot.noise.aim(hand, "put"))
     if reason is FailureReason.NONE and target not in robot.perception.supports(name):
         return FailureReason.MISPLACED
     return reason

@@ -34,7 +34,7 @@ from sim.noise import (
 from tests.conftest import action
 
 ARM = (
-    AimError(0.024),
+    AimError(0.018, 0.024),
     SightError(0.006),
     Calibration(0.006),
     Backlash(0.01),
@@ -69,9 +69,8 @@ def test_a_composition_prints_each_part_once() -> None:
     noise = PhysicalNoise({"left": 0.5, "right": 0.5, "pull": 0.2}, arm=ARM, pull=TOOL, push=TOOL)
     lines = noise.told()
     assert len(lines) == len(ARM) + len(TOOL)
-    assert lines[0] == (
-        "left arm, right arm: aim off by a Gaussian of 20.4 mm in x and y, anew for every grasp and put"
-    )
+    aim = "aim off by a Gaussian of 15.3 mm (grasp) or 20.4 mm (put) in x and y, every time"
+    assert lines[0] == f"left arm, right arm: {aim}"
     assert lines[-1] == "pull: the tool's head too high by a Gaussian of 2.0 mm, every time"
     assert len(PhysicalNoise({"left": 0.5, "right": 0.2}, arm=ARM).told()) == 2 * len(ARM)
     assert PhysicalNoise({}).told() == ()
@@ -80,7 +79,7 @@ def test_a_composition_prints_each_part_once() -> None:
 
 def test_errors_of_aim_add_up() -> None:
     draw = rng()
-    aim, sight = (np.array([part.aim(0.5, draw) for _ in range(4000)]) for part in ARM[:2])
+    aim, sight = (np.array([part.aim(0.5, "put", draw) for _ in range(4000)]) for part in ARM[:2])
     assert aim.std(axis=0) == pytest.approx(2 * [spread(0.5, 0.024)], rel=0.05)
     assert sight.std(axis=0) == pytest.approx([0.003, 0.003], rel=0.05)
     up = np.array([HeadLift(0.01).head(0.5, draw) for _ in range(1000)])
@@ -94,9 +93,7 @@ def test_calibration_is_off_by_the_same_all_the_time() -> None:
     part.begin(0.5, arm, 7, rng())
     first = part.set_point(0.5, joints, joints, arm, rng())
     assert first.any()
-    assert (first == part.set_point(0.5, joints + 1.0, joints, arm, rng()) - 1.0).all() or np.allclose(
-        first, part.set_point(0.5, joints + 1.0, joints, arm, rng()) - 1.0
-    )
+    assert part.set_point(0.5, joints + 1.0, joints, arm, rng()) - 1.0 == pytest.approx(first)
 
 
 def test_backlash_is_play_between_motor_and_joint() -> None:
@@ -155,7 +152,7 @@ def test_an_episode_draws_for_noisy_arms_only(noisy: DrakeEnvironment) -> None:
     assert frictions(noisy, "l") == {FINGER_FRICTION * drawn["LeftHand"]["friction"]}
     assert drawn["LeftHand"]["friction"] < 1
     assert frictions(noisy, "r") == {FINGER_FRICTION}
-    assert not noisy.robot.noise.aim("RightHand").any()
+    assert not noisy.robot.noise.aim("RightHand", "put").any()
     assert noisy.robot.noise.grip("RightHand") == 1.0
     assert not noisy.robot.noise.head("push").any()
     assert noisy.robot.noise.head("pull").all()
@@ -170,7 +167,7 @@ def test_without_noise_nothing_is_drawn_and_nothing_changes(domain: Domain) -> N
     environment.reset(3)
     state = environment.robot.rng.bit_generator.state
     noise, world = environment.robot.noise, environment.world
-    assert not np.concatenate([noise.aim("LeftHand"), noise.head("pull"), noise.head("push")]).any()
+    assert not np.concatenate([noise.aim("LeftHand", "grasp"), noise.head("pull"), noise.head("push")]).any()
     assert noise.grip("LeftHand") == 1.0
     assert world.on_send is None
     assert environment.robot.rng.bit_generator.state == state

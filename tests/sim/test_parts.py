@@ -15,7 +15,6 @@ from sim import pictures
 from sim.assets import robot_urdf, roll_pitch_yaw, rotation
 from sim.environment import DrakeEnvironment
 from sim.kinematics import DOWN, HandTarget, Kinematics, fingertip, palm_axis
-from sim.robot import AimNoise
 from sim.scenario import object_inertia
 from sim.world import World
 
@@ -113,15 +112,6 @@ def test_reach_is_kinematic(kinematics: Kinematics) -> None:
     # Each arm reaches farther on its own side (left is y < 0).
     assert kinematics.reaches("LeftHand", -0.48, -0.22)
     assert not kinematics.reaches("RightHand", -0.48, -0.22)
-
-
-def test_aim_noise() -> None:
-    noise = AimNoise({"left": 0.5})
-    rng = np.random.default_rng(0)
-    errors = np.array([noise.draw("LeftHand", rng) for _ in range(2000)])
-    assert errors.std(axis=0) == pytest.approx([0.02, 0.02, 0.0], abs=0.001)
-    assert not noise.draw("RightHand", rng).any()
-    assert "left 20.0 mm" in str(noise)
 
 
 def test_complex_scene_knows_what_is_out_of_reach(domain: Domain) -> None:
