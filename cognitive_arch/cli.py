@@ -52,6 +52,7 @@ SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
 RecordOption = Annotated[
     bool, typer.Option("--record/--no-record", help="Keep a Meshcat recording and pictures (drake).")
 ]
+VideoOption = Annotated[bool, typer.Option("--video", help="Make a video of the run, too (drake).")]
 EventOption = Annotated[
     list[str],
     typer.Option(
@@ -124,6 +125,7 @@ def run(
     event: EventOption = [],  # noqa: B006 (typer wants a list)
     store: StoreOption = Path("runs"),
     record: RecordOption = True,
+    video: VideoOption = False,
     as_json: Json = False,
 ) -> None:
     """Do what a sentence asks for: look, plan, act, notice what went wrong, find another way."""
@@ -150,6 +152,7 @@ def run(
         reach=reach,
         rules=rules,
         record=record,
+        video=video,
         events=tuple(map(OutsideEvent.parse, event)),
     )
     _carry_out(lambda progress: run_task(task, config, store, progress), store, as_json)
@@ -190,6 +193,7 @@ def demo(
     seed: SeedOption = 0,
     store: StoreOption = Path("runs"),
     record: RecordOption = True,
+    video: VideoOption = False,
     as_json: Json = False,
 ) -> None:
     """Run a named scenario: a tool for what is out of reach, sabotage, a slip, a thing that disappears."""
@@ -201,7 +205,7 @@ def demo(
     if name is None:
         return _print(demos.to_json(), str(demos), as_json)
     chosen = demos.find(name)
-    config = chosen.config(backend, seed, record)
+    config = chosen.config(backend, seed, record, video)
     _print({}, "" if as_json else report.demo_text(chosen, config), False)
 
     def work(progress: Progress) -> dict[str, Any]:
@@ -261,10 +265,20 @@ def inspect(
     ] = None,
     step: Annotated[int | None, typer.Option(help="Show the world as it was when this step began.")] = None,
     format_: Annotated[str, typer.Option("--format", help="text, or jsonl: one line per step.")] = "text",
+    video: Annotated[
+        Path | None, typer.Option(metavar="FILE.mp4", help="Make a video of the run from its trajectory.")
+    ] = None,
     store: StoreOption = Path("runs"),
     as_json: Json = False,
 ) -> None:
     """List the runs; or show one: plans, actions, the world at any step, why each heuristic fired."""
+    if video is not None:
+        from cognitive_arch.filming import film
+
+        if run_id is None or step is not None or format_ != "text":
+            raise ConfigError("--video needs a run (or 'latest'), and goes without --step and --format")
+        made = film(run_id, store, video)
+        return _print(made, f"wrote {made['video']}", as_json)
     from cognitive_arch import inspection
 
     view = inspection.view(store, run_id, step, format_)

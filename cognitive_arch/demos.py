@@ -38,7 +38,9 @@ class Demo(BaseModel):
     events: tuple[Annotated[OutsideEvent, BeforeValidator(event_from_text)], ...] = ()
     succeeds: bool = True
 
-    def config(self, backend: str | None = None, seed: int = 0, record: bool = True) -> RunConfig:
+    def config(
+        self, backend: str | None = None, seed: int = 0, record: bool = True, video: bool = False
+    ) -> RunConfig:
         """How to run it; raises `ConfigError` for settings that cannot be."""
         return RunConfig(
             scene=self.scene,
@@ -48,6 +50,7 @@ class Demo(BaseModel):
             seed=seed,
             jitter=self.jitter,
             record=record,
+            video=video,
             events=self.events,
         )
 

@@ -85,7 +85,10 @@ def result_text(result: dict[str, Any]) -> str:
         f"speed {result['speed']:.2f}, {result['wall_s']:.1f} s",
         f"kept as {result['run_id']} in {result['store']}; see: cogarch inspect {result['run_id']}",
     ]
-    lines.extend(f"wrote {path}" for path in result["artifacts"])
+    pictures = [path for path in result["artifacts"] if Path(path).name.startswith("step-")]
+    lines.extend(f"wrote {path}" for path in result["artifacts"] if path not in pictures)
+    if pictures:
+        lines.append(f"      and {len(pictures)} pictures of the steps beside them")
     return "\n".join(lines)
 
 

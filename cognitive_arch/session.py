@@ -142,6 +142,7 @@ class RunConfig:
     record: bool = True
     events: tuple[OutsideEvent, ...] = ()
     reach: str | None = None
+    video: bool = False
 
     def __post_init__(self) -> None:
         if not 0 <= self.seed < 2**63:
@@ -151,6 +152,8 @@ class RunConfig:
         if self.backend not in BACKENDS:
             raise ConfigError(unknown("backend", self.backend, BACKENDS))
         reach_model(self.backend, self.reach)
+        if self.video and not (self.record and self.backend == "drake"):
+            raise ConfigError("a video needs physics and a recording: --backend drake, without --no-record")
         make_planner(self.planner)
 
     def to_json(self) -> dict[str, Any]:
@@ -348,6 +351,7 @@ def _prepared(task: Task, config: RunConfig, setting: Setting) -> Iterator[Envir
         noise=config.noise,
         jitter=config.jitter,
         record=config.record,
+        video=config.video,
         reach=config.reach,
     )
     try:

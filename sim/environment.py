@@ -16,7 +16,7 @@ from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
 from sim.meddling import disturb
 from sim.noise import EpisodeNoise, PhysicalNoise
-from sim.pictures import Photographer
+from sim.pictures import LARGE, SMALL, Stage, View, save_picture, write_recording, write_video
 from sim.recorder import Recorder
 from sim.robot import Robot
 from sim.scenario import FRICTION
@@ -26,13 +26,14 @@ from sim.world import World
 
 SETTLE = 0.3  # s before the first look
 FORMAT = 1  # of saved states
+ARTIFACTS = (".png", ".npz", ".html", ".mp4")
 
 
 class DrakeEnvironment:
     """A simulated iCub at a table; see `Environment`.
 
     `noise` maps `left`, `right`, `pull` and `push` to noise levels, or is a composition of its own.
-    `record` makes pictures, a trajectory and a Meshcat recording of an episode.
+    `record` makes pictures, a trajectory and a Meshcat recording of an episode, with `video` a video, too.
     `reach` is `kinematic`, or `published` for the constants of the scene.
     """
 
@@ -46,6 +47,7 @@ class DrakeEnvironment:
         noise: Mapping[str, float] | PhysicalNoise | None = None,
         jitter: float = 0.0,
         record: bool = False,
+        video: bool = False,
         friction: float = FRICTION,
         reach: str = "kinematic",
     ) -> None:
@@ -55,9 +57,10 @@ class DrakeEnvironment:
         self.noise_told = self._noise.told()
         self._jitter = jitter
         self._reach = scene.reach if reach == "published" else None
-        self.world = World(domain, scene, record=record, friction=friction)
+        self.world = World(domain, scene, friction=friction)
         self.recorder = Recorder(self.world, keep=record)
-        self._photographer = Photographer(self.world) if record else None
+        self._stage = Stage(domain, scene) if record else None
+        self._video = video
         self._robot: Robot | None = None
         self._folder: Path | None = None
 
@@ -75,11 +78,7 @@ class DrakeEnvironment:
         self.recorder.restart()
         self._robot = self._new_robot(rng)
         self._robot.noise.begin()
-        if self._photographer:
-            self._photographer.start()
         self.world.hold(SETTLE)
-        if self._photographer:
-            self._photographer.take("start")
         return self.observe()
 
     def _new_robot(self, rng: np.random.Generator) -> Robot:
@@ -105,8 +104,6 @@ class DrakeEnvironment:
         held = self.robot.perception.held(hand)
         self.recorder.begin(str(action))
         reason = entry.perform(self.robot, action.args)
-        if self._photographer:
-            self._photographer.after_action()
         moved = self.world.pose(name).translation() - before
         effect = {f"displacement_{axis}": float(d) for axis, d in zip("xyz", moved, strict=True)}
         effect["duration"] = self.world.time - started
@@ -146,25 +143,38 @@ class DrakeEnvironment:
         return Trajectory.load(path).until(self.world.time) if path and path.exists() else None
 
     def record_into(self, folder: Path) -> None:
-        """See `Environment.record_into`."""
-        if self._photographer is None:
+        """See `Environment.record_into`: `start.png` at once."""
+        if self._stage is None:
             return
         self._folder = folder
+        self._take(folder / "start.png", View.SIDE, LARGE)
 
     def keep_step(self, number: int) -> None:
-        """See `Environment.keep_step`."""
-        if self._folder is not None:
-            self.recorder.trajectory().save(self._folder / TRAJECTORY)
+        """See `Environment.keep_step`: two pictures of the step, and the trajectory so far."""
+        if self._folder is None:
+            return
+        for view in View:
+            self._take(self._folder / f"step-{number:02}-{view}.png", view)
+        self.recorder.trajectory().save(self._folder / TRAJECTORY)
 
     def save_artifacts(self) -> tuple[str, ...]:
-        """See `Environment.save_artifacts`."""
-        if self._photographer is None or self._folder is None:
+        """See `Environment.save_artifacts`: `end.png`, `recording.html` and perhaps `video.mp4`."""
+        if self._stage is None or self._folder is None:
             return ()
-        self.recorder.trajectory().save(self._folder / TRAJECTORY)
-        self._photographer.take("end")
-        return (*self._photographer.save(self._folder), TRAJECTORY)
+        self._take(self._folder / "end.png", View.SIDE, LARGE)
+        trajectory = self.recorder.trajectory()
+        trajectory.save(self._folder / TRAJECTORY)
+        write_recording(self._domain, self._scene, trajectory, self._folder / "recording.html")
+        if self._video:
+            write_video(self._stage, trajectory, self._folder / "video.mp4")
+        return tuple(sorted(path.name for path in self._folder.iterdir() if path.suffix in ARTIFACTS))
+
+    def _take(self, path: Path, view: View, size: tuple[int, int] = SMALL) -> None:
+        assert self._stage is not None
+        self._stage.show(self.world.positions())
+        save_picture(self._stage.picture(view, size), path)
 
     def close(self) -> None:
         """See `Environment.close`."""
         self._robot = None
-        self._photographer = None
+        self._stage = None

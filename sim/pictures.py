@@ -1,12 +1,20 @@
-"""Pictures and recordings of an episode, without a display."""
+"""Pictures of a scene, without a display: still ones, a video and a Meshcat recording of a trajectory.
+
+They are taken in a copy of the scene, so that looking changes nothing in the simulation and can be done
+afterwards just as well.
+"""
 
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Sequence
+import os
+from collections.abc import Iterator, Sequence
+from enum import StrEnum
 from pathlib import Path
 
+import cv2
 import numpy as np
+from cv2.typing import MatLike
 from numpy.typing import NDArray
 from PIL import Image
 from pydrake.geometry import (
@@ -14,19 +22,37 @@ from pydrake.geometry import (
     ColorRenderCamera,
     LightParameter,
     MakeRenderEngineVtk,
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
     RenderCameraCore,
     RenderEngineVtkParams,
+    Role,
 )
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
-from cognitive_arch.errors import BackendError
-from sim.world import RECORDING_FPS, World
+from cognitive_arch.domain import Domain, Scene
+from cognitive_arch.errors import BackendError, StoreError
+from cognitive_arch.runlog.trajectory import Trajectory
+from sim.scenario import build_scenario
 
+Pixels = NDArray[np.uint8]  # (height, width, 3), RGB
 RENDERER = "pictures"
-WIDTH, HEIGHT, FIELD_OF_VIEW = 960, 720, 0.75  # pixels, pixels, radians
-RECORDING_LIMIT = 240.0  # simulated s
-CAMERA_FROM, CAMERA_TO = (-1.12, 0.60, 0.46), (-0.17, 0.02, 0.05)  # m
+LARGE, SMALL = (960, 720), (640, 480)  # pixels
+SIDE_FROM, SIDE_TO, SIDE_VIEW = (-1.12, 0.60, 0.46), (-0.17, 0.02, 0.05), 0.75  # m, m, rad
+EYE_FROM, EYE_TO, EYE_VIEW = (-0.17, 0.0, 0.34), (-0.40, 0.0, -0.10), 1.05  # m, m, rad; sitting upright
+VIDEO_FPS = 12.5
+RECORDING_FPS, RECORDING_FRAMES = 5.0, 1200  # the viewer interpolates; more frames would take more than 15 MB
+_FONT, _INK, _PAPER = cv2.FONT_HERSHEY_SIMPLEX, (30, 30, 30), (255, 255, 255)
+
+
+class View(StrEnum):
+    """From where a picture is taken."""
+
+    SIDE = "side"
+    EYE = "eye"
 
 
 def look_from(p_WC: Sequence[float], p_WT: Sequence[float]) -> RigidTransform:
@@ -50,63 +76,131 @@ def check_rendering() -> None:
         ) from None
 
 
-class Photographer:
-    """Takes pictures of a world and records it in Meshcat."""
+class Stage:
+    """A scene that stands still until it is told how it looks."""
 
-    def __init__(self, world: World) -> None:
-        check_rendering()
-        self._world = world
-        self._pictures: dict[str, NDArray[np.uint8]] = {}
-        lights = [
-            LightParameter(type="directional", direction=[0.4, -0.3, -1.0], intensity=0.9, frame="world"),
-            LightParameter(type="directional", direction=[1.0, 0.3, -0.25], intensity=0.55, frame="world"),
-            LightParameter(type="directional", direction=[0.1, -1.0, -0.3], intensity=0.45, frame="world"),
-        ]
-        params = RenderEngineVtkParams(default_clear_color=[0.90, 0.93, 0.96], lights=lights)
-        world.scenario.scene_graph.AddRenderer(
-            world.scenario.scene_graph.GetMyMutableContextFromRoot(world.simulator.get_mutable_context()),
-            RENDERER,
-            MakeRenderEngineVtk(params),
-        )
+    def __init__(self, domain: Domain, scene: Scene, meshcat: Meshcat | None = None) -> None:
+        scenario = build_scenario(domain, scene)
+        self.plant, self._graph = scenario.plant, scenario.scene_graph
+        if meshcat is None:
+            check_rendering()
+            params = RenderEngineVtkParams(default_clear_color=[0.90, 0.93, 0.96], lights=_lights())
+            self._graph.AddRenderer(RENDERER, MakeRenderEngineVtk(params))
+        else:
+            visual = MeshcatVisualizerParams(role=Role.kIllustration)
+            MeshcatVisualizer.AddToBuilder(scenario.builder, self._graph, meshcat, visual)
+        self.diagram = scenario.builder.Build()
+        self.context = self.diagram.CreateDefaultContext()
+        self._plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
+        self._starts = {name: body.floating_positions_start() for name, body in scenario.objects.items()}
+        self._eye = self._find_eye()
+
+    def _find_eye(self) -> RigidTransform:
+        """X_HC of the eyes in the head."""
+        X_WH = self.plant.GetFrameByName("head").CalcPoseInWorld(self._plant_context)
+        return X_WH.inverse() @ look_from(EYE_FROM, EYE_TO)
+
+    def show(self, positions: NDArray[np.floating]) -> None:
+        """Set all positions of the plant, in the simulation's order."""
+        self.plant.SetPositions(self._plant_context, positions)
+
+    def positions(self, trajectory: Trajectory) -> Iterator[NDArray[np.floating]]:
+        """The plant's positions at every sample; raises `StoreError` for the trajectory of another scene."""
+        if set(trajectory.object_names) != set(self._starts):
+            raise StoreError(
+                f"the trajectory is of {', '.join(trajectory.object_names)}, the scene has "
+                f"{', '.join(sorted(self._starts))}"
+            )
+        joints = [self.plant.GetJointByName(name).position_start() for name in trajectory.joint_names]
+        for sample in range(len(trajectory)):
+            positions = np.zeros(self.plant.num_positions())
+            positions[joints] = trajectory.joints[sample]
+            for name, pose in zip(trajectory.object_names, trajectory.poses[sample], strict=True):
+                start = self._starts[name]
+                positions[start : start + 4] = pose[3:] / np.linalg.norm(pose[3:])
+                positions[start + 4 : start + 7] = pose[:3]
+            yield positions
+
+    def picture(self, view: View, size: tuple[int, int] = SMALL) -> Pixels:
+        """What is to be seen from there, `size` (width, height) in pixels."""
+        X_WC, angle = look_from(SIDE_FROM, SIDE_TO), SIDE_VIEW
+        if view is View.EYE:
+            head = self.plant.GetFrameByName("head").CalcPoseInWorld(self._plant_context)
+            X_WC, angle = head @ self._eye, EYE_VIEW
         core = RenderCameraCore(
-            RENDERER, CameraInfo(WIDTH, HEIGHT, FIELD_OF_VIEW), ClippingRange(0.02, 6.0), RigidTransform()
+            RENDERER, CameraInfo(*size, angle), ClippingRange(0.02, 6.0), RigidTransform()
         )
-        self._camera = ColorRenderCamera(core, False)
+        query = self._graph.get_query_output_port().Eval(self._graph.GetMyContextFromRoot(self.context))
+        image = query.RenderColorImage(ColorRenderCamera(core, False), self._graph.world_frame_id(), X_WC)
+        return np.array(image.data[:, :, :3], dtype=np.uint8)
 
-    def start(self) -> None:
-        """Begin a recording; an earlier one is forgotten."""
-        self._pictures.clear()
-        meshcat = self._world.meshcat
-        assert meshcat is not None
-        meshcat.DeleteRecording()
-        meshcat.SetProperty("/Grid", "visible", False)
-        meshcat.SetProperty("/Axes", "visible", False)
-        meshcat.SetCameraPose(CAMERA_FROM, CAMERA_TO)
-        meshcat.StartRecording(frames_per_second=RECORDING_FPS, set_visualizations_while_recording=False)
 
-    def after_action(self) -> None:
-        """Keep the recording below 15 MB: an episode this long has shown what there is to see."""
-        if self._world.time > RECORDING_LIMIT and self._world.meshcat is not None:
-            self._world.meshcat.StopRecording()
+def _lights() -> list[LightParameter]:
+    return [
+        LightParameter(type="directional", direction=[0.4, -0.3, -1.0], intensity=0.9, frame="world"),
+        LightParameter(type="directional", direction=[1.0, 0.3, -0.25], intensity=0.55, frame="world"),
+        LightParameter(type="directional", direction=[0.1, -1.0, -0.3], intensity=0.45, frame="world"),
+    ]
 
-    def take(self, name: str) -> None:
-        """Take a picture of the present moment."""
-        graph = self._world.scenario.scene_graph
-        context = graph.GetMyContextFromRoot(self._world.simulator.get_context())
-        query = graph.get_query_output_port().Eval(context)
-        X_WC = look_from(CAMERA_FROM, CAMERA_TO)
-        image = query.RenderColorImage(self._camera, graph.world_frame_id(), X_WC)
-        self._pictures[name] = np.array(image.data[:, :, :3], dtype=np.uint8)
 
-    def save(self, folder: Path) -> tuple[str, ...]:
-        """Write all pictures and the recording into `folder`; returns the file names."""
-        names = []
-        for name, pixels in self._pictures.items():
-            Image.fromarray(pixels).save(folder / f"{name}.png", optimize=True)
-            names.append(f"{name}.png")
-        meshcat = self._world.meshcat
-        assert meshcat is not None
-        meshcat.StopRecording()
-        meshcat.PublishRecording()
-        (folder / "recording.html").write_text(meshcat.StaticHtml(), encoding="utf-8")
-        return (*names, "recording.html")
+def save_picture(pixels: Pixels, path: Path) -> None:
+    """Write a PNG."""
+    Image.fromarray(pixels).save(path)
+
+
+def _evenly(trajectory: Trajectory, rate: float, most: int | None = None) -> list[int]:
+    """Samples as near as can be to `rate` per second, at most `most`."""
+    if len(trajectory) == 0:
+        return []
+    first, last = trajectory.time[0], trajectory.time[-1]
+    n = round((last - first) * rate) + 1
+    times = np.linspace(first, last, n if most is None else min(n, most))
+    after = np.searchsorted(trajectory.time, times).clip(1, max(1, len(trajectory) - 1))
+    if len(trajectory) == 1:
+        return [0]
+    nearer = times - trajectory.time[after - 1] < trajectory.time[after] - times
+    return [int(i) for i in np.where(nearer, after - 1, after)]
+
+
+def write_video(stage: Stage, trajectory: Trajectory, path: Path) -> None:
+    """An MP4 of the side view at `VIDEO_FPS`, in real time, with the action's name in it."""
+    if not (path.parent.is_dir() and os.access(path.parent, os.W_OK)):
+        raise StoreError(f"cannot write the video '{path}': there is no folder for it that can be written to")
+    writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), VIDEO_FPS, SMALL)
+    if not writer.isOpened():
+        raise StoreError(f"cannot write the video '{path}'")
+    positions = list(stage.positions(trajectory))
+    try:
+        for sample in _evenly(trajectory, VIDEO_FPS):
+            stage.show(positions[sample])
+            frame = cv2.cvtColor(stage.picture(View.SIDE), cv2.COLOR_RGB2BGR)
+            _write_on(frame, trajectory.labels[trajectory.label[sample]], (16, SMALL[1] - 20), 0.7)
+            _write_on(frame, f"{trajectory.time[sample]:5.1f} s", (SMALL[0] - 100, 30), 0.55)
+            writer.write(frame)
+    finally:
+        writer.release()
+
+
+def _write_on(frame: MatLike, text: str, place: tuple[int, int], scale: float) -> None:
+    """Dark letters with a light rim, readable on anything; `place` is their lower left corner."""
+    for color, width in ((_PAPER, 5), (_INK, 2)):
+        cv2.putText(frame, text, place, _FONT, scale, color, width, cv2.LINE_AA)
+
+
+def write_recording(domain: Domain, scene: Scene, trajectory: Trajectory, path: Path) -> None:
+    """One HTML file for any browser, which needs no network; the whole episode in below 15 MB."""
+    meshcat = Meshcat(MeshcatParams(host="localhost", port=None, show_stats_plot=False))
+    stage = Stage(domain, scene, meshcat)
+    meshcat.SetProperty("/Grid", "visible", False)
+    meshcat.SetProperty("/Axes", "visible", False)
+    meshcat.SetCameraPose(SIDE_FROM, SIDE_TO)
+    positions = list(stage.positions(trajectory))
+    samples = _evenly(trajectory, RECORDING_FPS, RECORDING_FRAMES)
+    meshcat.StartRecording(frames_per_second=VIDEO_FPS * 4, set_visualizations_while_recording=False)
+    for sample in samples:
+        stage.context.SetTime(float(trajectory.time[sample]))
+        stage.show(positions[sample])
+        stage.diagram.ForcedPublish(stage.context)
+    meshcat.StopRecording()
+    meshcat.PublishRecording()
+    path.write_text(meshcat.StaticHtml(), encoding="utf-8")

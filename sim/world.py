@@ -7,15 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import (
-    Meshcat,
-    MeshcatParams,
-    MeshcatVisualizer,
-    MeshcatVisualizerParams,
-    ProximityProperties,
-    Role,
-    RoleAssign,
-)
+from pydrake.geometry import ProximityProperties, RoleAssign
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import CoulombFriction
@@ -28,7 +20,6 @@ from sim.scenario import FRICTION, Scenario, build_scenario, resist_rolling
 Joints = NDArray[np.float64]
 COMMAND_PERIOD = 0.02  # s between two set points of a motion
 PARK = (2.0, 0.0, -5.0)  # m; where objects wait that are not in the scene: out of sight, far below
-RECORDING_FPS = 5.0  # the viewer interpolates between frames
 
 HOME: Mapping[str, float] = {  # rad; both hands beside the table's work area, well above it
     "torso_pitch": 0.1,
@@ -46,16 +37,11 @@ HOME: Mapping[str, float] = {  # rad; both hands beside the table's work area, w
 class World:
     """One episode's physics. Joint vectors list the actuated joints in the order of `joint_names`."""
 
-    def __init__(
-        self, domain: Domain, scene: Scene, *, record: bool = False, friction: float = FRICTION
-    ) -> None:
+    def __init__(self, domain: Domain, scene: Scene, *, friction: float = FRICTION) -> None:
         self.domain = domain
         self.scene = scene
         self.scenario: Scenario = build_scenario(domain, scene, friction=friction)
         plant = self.plant = self.scenario.plant
-        self.meshcat: Meshcat | None = None
-        if record:
-            self._add_meshcat()
         self.diagram = self.scenario.builder.Build()
         self.simulator = Simulator(self.diagram)
         self._context = self.simulator.get_mutable_context()
@@ -79,12 +65,6 @@ class World:
         self._friction: dict[str, float] = {}
         self.on_tick: Callable[[], None] = lambda: None
         self._seen_contacts: tuple[float, frozenset[tuple[str, str]]] | None = None
-
-    def _add_meshcat(self) -> None:
-        params = MeshcatParams(host="localhost", port=None, show_stats_plot=False)
-        self.meshcat = Meshcat(params)
-        visual = MeshcatVisualizerParams(role=Role.kIllustration, publish_period=1.0 / RECORDING_FPS)
-        MeshcatVisualizer.AddToBuilder(self.scenario.builder, self.scenario.scene_graph, self.meshcat, visual)
 
     # -- setting up ---------------------------------------------------------------------------------
 
@@ -149,6 +129,11 @@ class World:
         """Measured joint positions, (n_joints,)."""
         measured: Joints = self.plant.GetPositions(self._plant_context)[self._positions]
         return measured
+
+    def positions(self) -> NDArray[np.float64]:
+        """All positions of the plant, (n_positions,)."""
+        positions: NDArray[np.float64] = self.plant.GetPositions(self._plant_context)
+        return positions
 
     def contacts(self) -> frozenset[tuple[str, str]]:
         """Names of the bodies that press on each other now, each pair in both orders.

@@ -201,6 +201,9 @@ def test_on_the_command_line(cogarch: Any, tmp_path: Path) -> None:
         assert (answer.code, answer.out) == (2, "")
         assert len(answer.err.splitlines()) == 1
         assert says in answer.err
+    answer = cogarch("inspect", run_id, "--video", "x.mp4")
+    assert (answer.code, answer.err.count("\n")) == (2, 1)
+    assert "there is no trajectory" in answer.err
     answer = cogarch("run", "--resume", run_id[:-2], "--json")
     assert answer.code == 0
     assert answer.json["run_id"] == run_id

@@ -44,12 +44,14 @@ def make_environment(
     noise: NoiseLevels,
     jitter: float = 0.0,
     record: bool = False,
+    video: bool = False,
     reach: str | None = None,
 ) -> Environment:
     """An environment for one scene; raises `BackendError` for an unknown or unusable one.
 
-    `rules` are the truth of the symbolic world; physics needs none. `record` keeps what
-    `save_artifacts` needs. `reach` is one of the backend's `REACH_MODELS`.
+    `rules` are the truth of the symbolic world; physics needs none. `record` keeps pictures and
+    what else `save_artifacts` finishes, with `video` a video, too. `reach` is one of the backend's
+    `REACH_MODELS`.
     """
     if backend not in BACKENDS:
         raise BackendError(unknown("backend", backend, BACKENDS))
@@ -58,14 +60,19 @@ def make_environment(
         from cognitive_arch.execution.symbolic import SymbolicEnvironment
 
         return SymbolicEnvironment(domain, scene, rules, noise, jitter)
+    module = drake_module("sim.environment")
+    environment: Environment = module.DrakeEnvironment(
+        domain, scene, noise=asdict(noise), jitter=jitter, record=record, video=video, reach=reach
+    )
+    return environment
+
+
+def drake_module(name: str) -> Any:
+    """A module of `sim`; raises `BackendError` where Drake is not installed."""
     try:
-        module: Any = importlib.import_module("sim.environment")
+        return importlib.import_module(name)
     except ImportError as error:
         raise BackendError(
             f"the drake backend cannot be loaded ({one_line(error)}); "
             "install the packages drake and icub-models, or use --backend symbolic"
         ) from None
-    environment: Environment = module.DrakeEnvironment(
-        domain, scene, noise=asdict(noise), jitter=jitter, record=record, reach=reach
-    )
-    return environment

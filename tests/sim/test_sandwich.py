@@ -7,19 +7,23 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
+import cv2
 import numpy as np
 import pytest
 from PIL import Image
 from pydrake.math import RigidTransform
 
 from cognitive_arch.domain import Domain, load_scene
+from cognitive_arch.errors import StoreError
 from cognitive_arch.execution.environment import FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.runlog.trajectory import Trajectory
-from cognitive_arch.session import RunConfig, run_task
+from cognitive_arch.session import Progress, RunConfig, resume_task, run_task
 from sim.check import HAND_PAIRS, attempt, sandwich, stacked
 from sim.environment import DrakeEnvironment
+from sim.pictures import Stage, write_video
 from tests.conftest import action
 from tests.sim.physics import check_physics
 
@@ -108,7 +112,7 @@ DIGEST = """
 import hashlib, json, sys
 from pathlib import Path
 from cognitive_arch.runlog.trajectory import Trajectory
-from cognitive_arch.session import RunConfig, run_task
+from cognitive_arch.session import Progress, RunConfig, resume_task, run_task
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.runlog.store import RunStore
 folder = Path(sys.argv[1])
@@ -153,23 +157,86 @@ def test_noise_makes_an_arm_miss_and_the_robot_finds_another_way(tmp_path: Path)
     }  # fmt: skip
 
 
-def test_a_recorded_run_leaves_pictures_and_one_html_file(tmp_path: Path) -> None:
-    """And its trajectory, in which nothing sinks into anything and joints stay in their limits."""
-    result = run_task("make a ham sandwich", RunConfig(), tmp_path)
+STEPS = [f"step-{n:02}-{view}.png" for n in range(1, 5) for view in ("eye", "side")]
+
+
+@pytest.fixture(scope="module")
+def recorded(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, Any]]:
+    """A recorded run that was killed when it had decided on its third action, and gone on with."""
+
+    class Killed(BaseException):
+        pass
+
+    actions: list[object] = []
+
+    def on_act(action: object) -> None:
+        actions.append(action)
+        if len(actions) == 3:
+            raise Killed
+
+    folder = tmp_path_factory.mktemp("recorded")
+    with pytest.raises(Killed):
+        run_task("make a ham sandwich", RunConfig(), folder, Progress(on_act=on_act))
+    (run,) = folder.glob("*-drake-0")
+    left = {path.name for path in run.iterdir() if not path.name.startswith(".")}
+    assert left == {*STEPS[:4], "start.png", "trajectory.npz"}
+    return run, resume_task("latest", folder)
+
+
+def test_a_recorded_run_leaves_pictures_and_one_html_file(recorded: tuple[Path, dict[str, Any]]) -> None:
+    _, result = recorded
     assert result["success"]
     files = {Path(p).name: Path(p) for p in result["artifacts"]}
-    assert set(files) == {"start.png", "end.png", "recording.html", "trajectory.npz"}
-    images = [np.asarray(Image.open(files[name]), dtype=float) for name in ("start.png", "end.png")]
-    assert images[0].std() > 20  # not a blank picture
-    assert np.abs(images[0] - images[1]).max() > 50  # and something has moved
+    assert set(files) == {"start.png", "end.png", *STEPS, "recording.html", "trajectory.npz"}
+    images = {name: np.asarray(Image.open(files[name]), float) for name in ("start.png", "end.png", *STEPS)}
+    for name, image in images.items():
+        assert image.std() > 20, name  # not a blank picture
+    for one, other in (("start.png", "end.png"), (STEPS[0], STEPS[2]), (STEPS[1], STEPS[5])):
+        assert np.abs(images[one] - images[other]).max() > 50  # something has moved
     html = files["recording.html"].read_text(encoding="utf-8")
-    assert len(html) < 15e6
+    assert 1e6 < len(html) < 15e6
     assert "<script src=" not in html
-    trajectory = Trajectory.load(files["trajectory.npz"])
+
+
+def test_a_resumed_runs_trajectory_is_whole_and_sound(recorded: tuple[Path, dict[str, Any]]) -> None:
+    """Nothing sinks into anything, joints stay in their limits, no sample is missing or there twice."""
+    path = recorded[0] / "trajectory.npz"
+    trajectory = Trajectory.load(path)
     check_physics(trajectory)
-    assert files["trajectory.npz"].stat().st_size < 1e6 * trajectory.time[-1] / 60
-    assert trajectory.labels[trajectory.label[len(trajectory) // 3]].startswith(("graspWith", "putOnWith"))
-    assert np.all(np.diff(trajectory.time) > 0)
+    assert path.stat().st_size < 1e6 * trajectory.time[-1] / 60
+    gaps = np.diff(trajectory.time)
+    assert gaps.min() > 0
+    assert gaps.max() < 0.09
+    assert trajectory.time[0] < 0.09
+    assert set(trajectory.labels) == {
+        "",
+        *(f"{a['action']}({','.join(a['args'])})" for a in recorded[1]["actions"]),
+    }
     ham = trajectory.object_names.index("Ham")
     assert trajectory.poses[:, ham, 2].max() - trajectory.poses[0, ham, 2] > 0.08  # it was lifted
-    assert trajectory.deepest({"Ham"}, {"l_finger_a"}) > 0.0002  # and squeezed
+    assert trajectory.deepest({"Ham"}, {"l_finger_a", "r_finger_a"}) > 0.0002  # and squeezed
+
+
+def test_a_video_of_a_trajectory(
+    domain: Domain, recorded: tuple[Path, dict[str, Any]], tmp_path: Path
+) -> None:
+    trajectory = Trajectory.load(recorded[0] / "trajectory.npz").until(4.0)
+    stage = Stage(domain, load_scene("simple"))
+    write_video(stage, trajectory, tmp_path / "video.mp4")
+    video = cv2.VideoCapture(str(tmp_path / "video.mp4"))
+    frames = []
+    while True:
+        ok, frame = video.read()
+        if not ok:
+            break
+        frames.append(frame.astype(float))
+    assert video.get(cv2.CAP_PROP_FPS) == 12.5
+    assert abs(len(frames) / 12.5 - 4.0) < 0.15
+    assert {frame.shape for frame in frames} == {(480, 640, 3)}
+    assert np.abs(frames[-1] - frames[0]).mean() > 1  # the arm moves
+    corner = [frame[440:475, 10:300] for frame in (frames[0], frames[-1])]
+    assert np.abs(corner[1] - corner[0]).mean() > 5  # the action's name appears
+    with pytest.raises(StoreError, match="cannot write the video"):
+        write_video(stage, trajectory, tmp_path / "nowhere" / "video.mp4")
+    with pytest.raises(StoreError, match="the scene has"):
+        write_video(Stage(domain, load_scene("kitchen")), trajectory, tmp_path / "other.mp4")
