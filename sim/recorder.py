@@ -98,8 +98,8 @@ class Recorder:
         speeds = {name: _length(state[i : i + 3]) for name, i in self._velocities.items()}
         for hand, body in self._hands.items():
             speeds[hand] = _length(body.EvalSpatialVelocityInWorld(context).translational())
-        # Reading contacts costs the most, so every second tick makes do, and fewer while nothing moves.
-        wait = 1 if max(speeds.values()) > AT_REST else KEEP_EVERY - 1
+        # Reading contacts costs the most, so every third tick makes do, and fewer while nothing moves.
+        wait = 2 if max(speeds.values()) > AT_REST else KEEP_EVERY - 1
         old = len(self._ticks) >= 1 and self._ticks[-1].age < wait
         self._ticks.append(
             Tick(
