@@ -214,17 +214,19 @@ def test_on_the_command_line(cogarch: Any, tmp_path: Path) -> None:
 
 @pytest.mark.physics
 def test_a_killed_process_in_drake(tmp_path: Path) -> None:
-    """SIGKILL after two steps; another process makes the same sandwich to the last digit."""
-    how = RunConfig(seed=8, jitter=0.02, noise=NoiseLevels(left=0.4), record=False)
-    expected = run_task(SANDWICH, how, tmp_path / "whole")
+    """SIGKILL after the first step; another process goes on to the last digit, noise included."""
+    sentence = "put the ham on the bottom bun with your left hand"
+    how = RunConfig(seed=8, jitter=0.02, noise=NoiseLevels(left=0.2), record=False)
+    expected = run_task(sentence, how, tmp_path / "whole")
     base = [sys.executable, "-m", "cognitive_arch.cli", "run", "--store", str(tmp_path / "cut")]
-    options = ["--seed", "8", "--jitter", "0.02", "--noise", "left=0.4", "--no-record"]
-    process = subprocess.Popen([*base, SANDWICH, *options], stdout=subprocess.PIPE, text=True)
+    options = ["--seed", "8", "--jitter", "0.02", "--noise", "left=0.2", "--no-record"]
+    process = subprocess.Popen([*base, sentence, *options], stdout=subprocess.PIPE, text=True)
     assert process.stdout is not None
-    while not process.stdout.readline().startswith("step 2"):
+    while not process.stdout.readline().startswith("step 1"):
         assert process.poll() is None
     process.kill()
     process.wait()
     done = subprocess.run([*base, "--resume", "latest", "--json"], capture_output=True, check=False)
     assert without_names(json.loads(done.stdout)) == without_names(expected)
+    assert len(expected["actions"]) >= 2
     assert kept(tmp_path / "cut") == kept(tmp_path / "whole")
