@@ -63,6 +63,8 @@ class Trajectory:
         partial = path.with_name(path.name + ".part")
         with partial.open("wb") as file:
             np.savez_compressed(file, format=np.int32(FORMAT), **arrays)
+            file.flush()
+            os.fsync(file.fileno())  # or a power cut could leave the name without the contents
         os.replace(partial, path)
 
     @classmethod

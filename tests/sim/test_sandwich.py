@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -217,13 +218,17 @@ def test_a_resumed_runs_trajectory_is_whole_and_sound(recorded: tuple[Path, dict
     assert trajectory.deepest({"Ham"}, {"l_finger_a", "r_finger_a"}) > 0.0002  # and squeezed
 
 
-def test_a_video_of_a_trajectory(
-    domain: Domain, recorded: tuple[Path, dict[str, Any]], tmp_path: Path
+def test_a_video_is_made_afterwards(
+    cogarch: Any, domain: Domain, recorded: tuple[Path, dict[str, Any]], tmp_path: Path
 ) -> None:
-    trajectory = Trajectory.load(recorded[0] / "trajectory.npz").until(4.0)
-    stage = Stage(domain, load_scene("simple"))
-    write_video(stage, trajectory, tmp_path / "video.mp4")
-    video = cv2.VideoCapture(str(tmp_path / "video.mp4"))
+    store, file = tmp_path / "runs", tmp_path / "video.mp4"
+    shutil.copytree(recorded[0].parent, store)
+    path = store / recorded[0].name / "trajectory.npz"
+    trajectory = Trajectory.load(path).until(4.0)
+    trajectory.save(path)
+    answer = cogarch("inspect", "latest", "--video", str(file), "--json")
+    assert answer.json == {"run_id": recorded[1]["run_id"], "video": str(file)}
+    video = cv2.VideoCapture(str(file))
     frames = []
     while True:
         ok, frame = video.read()
@@ -237,6 +242,6 @@ def test_a_video_of_a_trajectory(
     corner = [frame[440:475, 10:300] for frame in (frames[0], frames[-1])]
     assert np.abs(corner[1] - corner[0]).mean() > 5  # the action's name appears
     with pytest.raises(StoreError, match="cannot write the video"):
-        write_video(stage, trajectory, tmp_path / "nowhere" / "video.mp4")
+        write_video(Stage(domain, load_scene("simple")), trajectory, tmp_path / "nowhere" / "video.mp4")
     with pytest.raises(StoreError, match="the scene has"):
         write_video(Stage(domain, load_scene("kitchen")), trajectory, tmp_path / "other.mp4")
