@@ -167,13 +167,16 @@ class RunConfig:
 
     @classmethod
     def from_json(cls, data: Mapping[str, Any]) -> RunConfig:
-        """The inverse of `to_json`."""
-        parsed = {
-            "noise": NoiseLevels.parse(data["noise"]),
-            "heuristics": Heuristics.parse(data["heuristics"]),
-            "events": tuple(map(OutsideEvent.parse, data["events"])),
-        }
-        return cls(**{**data, **parsed})
+        """The inverse of `to_json`; raises `ConfigError` for what another version has written."""
+        try:
+            parsed = {
+                "noise": NoiseLevels.parse(data["noise"]),
+                "heuristics": Heuristics.parse(data["heuristics"]),
+                "events": tuple(map(OutsideEvent.parse, data["events"])),
+            }
+            return cls(**{**data, **parsed})
+        except (KeyError, TypeError, AttributeError) as error:
+            raise ConfigError(f"this run's configuration cannot be read: {one_line(error)}") from None
 
 
 @dataclass(frozen=True, slots=True)

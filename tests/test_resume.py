@@ -7,13 +7,14 @@ import sqlite3
 import subprocess
 import sys
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from cognitive_arch import session
-from cognitive_arch.errors import CogArchError, StateError, StoreError
+from cognitive_arch.errors import CogArchError, ConfigError, StateError, StoreError
 from cognitive_arch.execution.cycle import Step
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
@@ -184,6 +185,16 @@ def test_a_damaged_checkpoint(tmp_path: Path, column: str, value: str, error: ty
     with pytest.raises(error) as told:
         resume_task("latest", tmp_path)
     assert len(str(told.value).splitlines()) == 1
+
+
+def test_a_configuration_is_read_as_it_was_written() -> None:
+    how = CASES["events"][1]
+    assert RunConfig.from_json(json.loads(json.dumps(how.to_json()))) == replace(how, reach="published")
+    noisy = config(0, "left=0.12345678901234,push=1e-9")
+    assert RunConfig.from_json(noisy.to_json()).noise == noisy.noise
+    for bad in ({}, how.to_json() | {"future": 1}, how.to_json() | {"noise": None}):
+        with pytest.raises(ConfigError, match="cannot be read"):
+            RunConfig.from_json(bad)
 
 
 def test_on_the_command_line(cogarch: Any, tmp_path: Path) -> None:

@@ -75,6 +75,7 @@ class Trajectory:
                 if int(data["format"]) != FORMAT:
                     raise ValueError(f"its format is {int(data['format'])}, not {FORMAT}")
                 arrays: dict[str, Any] = {f.name: data[f.name] for f in fields(cls)}
+            _check(arrays)
         except FileNotFoundError:
             raise StoreError(
                 f"there is no trajectory at '{path}'; runs in Drake leave one unless --no-record is given"
@@ -89,3 +90,15 @@ class Trajectory:
 
 _SAMPLED = ("time", "joints", "commands", "beyond", "poses", "depths", "label")
 _SHORT = ("limits", "joints", "commands", "beyond", "poses", "depths")
+
+
+def _check(arrays: dict[str, Any]) -> None:
+    """Raise `ValueError` for arrays that do not fit together."""
+    n, m, k, p = (len(arrays[name]) for name in ("time", "joint_names", "object_names", "pairs"))
+    shapes = {"limits": (m, 2), "poses": (n, k, 7), "depths": (n, p), "label": (n,), "time": (n,)}
+    shapes |= dict.fromkeys(("joints", "commands", "beyond"), (n, m))
+    for name, shape in shapes.items():
+        if arrays[name].shape != shape and arrays[name].size + np.prod(shape) > 0:
+            raise ValueError(f"{name} has the shape {arrays[name].shape}, not {shape}")
+    if not set(arrays["label"].tolist()) <= set(range(len(arrays["labels"]))):
+        raise ValueError("it has samples without label")

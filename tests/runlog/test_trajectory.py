@@ -76,6 +76,8 @@ def test_unreadable_files(tmp_path: Path, trajectory: Trajectory) -> None:
         lambda: np.savez(path, format=np.int32(99)),
         lambda: np.savez(path, format=np.int32(1)),
         lambda: np.savez(path, **pickled),  # type: ignore[arg-type]
+        lambda: replace(trajectory, poses=trajectory.poses[:3]).save(path),
+        lambda: replace(trajectory, label=trajectory.label + 1).save(path),
     ):
         write()
         with pytest.raises(StoreError, match="cannot read the trajectory") as error:
