@@ -232,7 +232,7 @@ class PhysicalNoise:
 
     levels: Mapping[str, float]
     arm: tuple[ArmPart, ...] = (
-        AimError(grasp=0.021, put=0.026),
+        AimError(grasp=0.021, put=0.024),
         SightError(sigma=0.006),
         Calibration(sigma=0.006),
         Backlash(width=0.008),

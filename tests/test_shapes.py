@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 
+import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from cognitive_arch.domain import ObjectSpec, load_domain
+from cognitive_arch.domain import ObjectSpec, jittered, load_domain, load_scene
 from cognitive_arch.execution.placing import CLEARANCE, nearest_free
 from cognitive_arch.execution.placing import footprint as points
-from cognitive_arch.footprint import footprint, gap, outer_radius
+from cognitive_arch.footprint import footprint, gap, outer_radius, smallest_gap
 from cognitive_arch.shapes import Shape
 
 STUD = {"solid": {"type": "cylinder", "radius": 0.005, "height": 0.004}, "place": [0.02, 0.0], "above": 0.02}
@@ -90,3 +94,13 @@ def test_a_tool_has_the_shape_of_one() -> None:
     made = {"kind": "tool", "mass": 0.1, "color": [0, 0, 0], "shape": {"type": "sphere", "radius": 0.02}}
     with pytest.raises(ValidationError, match="needs a shape of type tool, this is a sphere"):
         ObjectSpec.model_validate(made)
+
+
+@settings(max_examples=50, deadline=None)
+@given(st.integers(0, 2**32))
+def test_jitter_never_pushes_things_into_each_other(seed: int) -> None:
+    scene, toys = load_scene("boxes"), load_domain("toys")
+    moved = jittered(scene, 0.05, np.random.default_rng(seed), toys)
+    covered = [footprint(toys.objects[n].shape, place.position) for n, place in moved.items()]
+    for a, b in itertools.combinations(covered, 2):
+        assert smallest_gap(a, b) > 0.0099
