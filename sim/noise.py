@@ -2,8 +2,8 @@
 
 A noise level (0 to 1, one per capability: `left`, `right`, `pull`, `push`) is meant to be the fraction of
 that capability's actions that fail. Nothing fails by decree: every part makes the robot move, grip or aim
-worse, and what comes of it is contact and gravity. A part's fields say how large it is at level 1 (or,
-where it is an error of aim, what the action tolerates). At level 0 nothing is drawn and nothing changes.
+worse, and what comes of it is contact and gravity. A part's fields say how large it is at level 1 (errors
+of aim: at level 0.5). At level 0 nothing is drawn and nothing changes.
 """
 
 from __future__ import annotations
@@ -23,12 +23,15 @@ from sim.world import Joints, World
 LARGEST_SPREAD = 0.08  # m; an error of aim at level 1
 
 
-def spread(level: float, tolerance: float) -> float:
-    """Standard deviation (metres, along each of two axes) of a Gaussian error that exceeds `tolerance`
-    (metres) with probability `level`."""
+def spread(level: float, half: float) -> float:
+    """Standard deviation (metres, along each of two axes) of a Gaussian error of aim at a level.
+
+    `half` is that at which half of the actions fail, and so it is the spread at level 0.5. The shape is fitted
+    to how often grasps and puts were seen to fail; near level 1 hardly anything works any more.
+    """
     if not 0 < level < 1:
         return LARGEST_SPREAD if level >= 1 else 0.0
-    return min(LARGEST_SPREAD, tolerance / math.sqrt(-2.0 * math.log(level)))
+    return min(LARGEST_SPREAD, half * (math.log(0.5) / math.log(level)) ** 0.4)
 
 
 @dataclass
@@ -83,14 +86,13 @@ class ToolPart(ABC):
 
 @dataclass(frozen=True)
 class AimError(ArmPart):
-    """The hand goes elsewhere, anew every time: Gaussian in x and y, such that it is off by more than what
-    a `grasp` or a `put` tolerates (metres) with a probability that is the level."""
+    """The hand goes elsewhere, anew every time: Gaussian in x and y, `grasp` or `put` metres at level 0.5."""
 
     grasp: float
     put: float
 
     def told(self, level: float) -> str:
-        grasp, put = (1000 * spread(level, tolerance) for tolerance in (self.grasp, self.put))
+        grasp, put = (1000 * spread(level, half) for half in (self.grasp, self.put))
         return f"aim off by a Gaussian of {grasp:.1f} mm (grasp) or {put:.1f} mm (put) in x and y, every time"
 
     def aim(self, level: float, verb: str, rng: np.random.Generator) -> Vector:
@@ -201,16 +203,16 @@ class WeakGrip(ArmPart):
 @dataclass(frozen=True)
 class HeadError(ToolPart):
     """The robot is wrong about where the tool's head is, anew for every sweep: Gaussian along the shaft and
-    across it, such that it is off by more than `tolerance` metres with a probability that is the level."""
+    across it, of `half` metres at level 0.5."""
 
-    tolerance: float
+    half: float
 
     def told(self, level: float) -> str:
-        sigma = 1000 * spread(level, self.tolerance)
+        sigma = 1000 * spread(level, self.half)
         return f"the tool's head off by a Gaussian of {sigma:.1f} mm along the shaft and across, every time"
 
     def head(self, level: float, rng: np.random.Generator) -> Vector:
-        return np.append(rng.normal(0.0, spread(level, self.tolerance), 2), 0.0)
+        return np.append(rng.normal(0.0, spread(level, self.half), 2), 0.0)
 
 
 @dataclass(frozen=True)
@@ -232,7 +234,7 @@ class PhysicalNoise:
 
     levels: Mapping[str, float]
     arm: tuple[ArmPart, ...] = (
-        AimError(grasp=0.021, put=0.024),
+        AimError(grasp=0.0185, put=0.0205),
         SightError(sigma=0.006),
         Calibration(sigma=0.006),
         Backlash(width=0.008),
@@ -240,8 +242,8 @@ class PhysicalNoise:
         SlipperyFingers(loss=0.5),
         WeakGrip(power=1.5),
     )
-    pull: tuple[ToolPart, ...] = (HeadError(tolerance=0.014), HeadLift(sigma=0.008))
-    push: tuple[ToolPart, ...] = (HeadError(tolerance=0.030), HeadLift(sigma=0.020))
+    pull: tuple[ToolPart, ...] = (HeadError(half=0.012), HeadLift(sigma=0.008))
+    push: tuple[ToolPart, ...] = (HeadError(half=0.0255), HeadLift(sigma=0.020))
 
     def level(self, capability: str) -> float:
         """The level of `left`, `right`, `pull` or `push`."""
