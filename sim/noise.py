@@ -26,8 +26,8 @@ LARGEST_SPREAD = 0.08  # m; an error of aim at level 1
 def spread(level: float, half: float) -> float:
     """Standard deviation (metres, along each of two axes) of a Gaussian error of aim at a level.
 
-    `half` is that at which half of the actions fail, and so it is the spread at level 0.5. The shape is fitted
-    to how often grasps and puts were seen to fail; near level 1 hardly anything works any more.
+    `half` is that at which half of the actions fail, and so it is the spread at level 0.5. The shape is
+    fitted to how often grasps and puts were seen to fail; near level 1 hardly anything works any more.
     """
     if not 0 < level < 1:
         return LARGEST_SPREAD if level >= 1 else 0.0
