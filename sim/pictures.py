@@ -182,9 +182,12 @@ def write_video(stage: Stage, trajectory: Trajectory, path: Path) -> None:
 
 
 def _write_on(frame: MatLike, text: str, place: tuple[int, int], scale: float) -> None:
-    """Dark letters with a light rim, readable on anything; `place` is their lower left corner."""
-    for color, width in ((_PAPER, 5), (_INK, 2)):
-        cv2.putText(frame, text, place, _FONT, scale, color, width, cv2.LINE_AA)
+    """Dark letters on a light label, readable on anything; `place` is their lower left corner."""
+    if text:
+        (width, height), below = cv2.getTextSize(text, _FONT, scale, 2)
+        corner = (place[0] + width + 6, place[1] + below)
+        cv2.rectangle(frame, (place[0] - 6, place[1] - height - 6), corner, _PAPER, cv2.FILLED)
+        cv2.putText(frame, text, place, _FONT, scale, _INK, 2, cv2.LINE_AA)
 
 
 def write_recording(domain: Domain, scene: Scene, trajectory: Trajectory, path: Path) -> None:
