@@ -2,7 +2,7 @@
 
 As shipped the file cannot be parsed by Drake (STL collision meshes, no motors, placeholder limits).
 The conversion thins the visual meshes, fixes legs and neck, replaces collision meshes by primitives and
-adds the grippers of `sim.hands`. It never touches the installed package.
+gives it the hands of `sim.hands`. It never touches the installed package.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from pathlib import Path
 import numpy as np
 
 from cognitive_arch.errors import BackendError, one_line
-from sim import hands, meshes
+from sim import hand_parts, hands, meshes
 
 MODEL = "iCubGazeboV2_7"
 MESH_CELL, HIDDEN_MESH_CELL = 0.006, 0.014
@@ -41,7 +41,7 @@ def cache_folder() -> Path:
     """Folder of the converted model: its name changes with the versions and with this code."""
     base = os.environ.get("XDG_CACHE_HOME")
     root = Path(base) if base else Path.home() / ".cache"
-    recipe = "".join(inspect.getsource(part) for part in (hands, meshes)) + Path(__file__).read_text("utf-8")
+    recipe = "".join(inspect.getsource(part) for part in (hand_parts, hands, meshes)) + Path(__file__).read_text("utf-8")
     digest = hashlib.sha256(recipe.encode("utf-8")).hexdigest()[:10]
     return root / "cognitive_arch" / f"icub-models-{version('icub-models')}-{digest}"
 
@@ -140,7 +140,7 @@ def _fix_joint(joint: ET.Element, angle: float) -> None:
     x, y, z = _numbers(axis.get("xyz"))
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     turn = np.eye(3) + math.sin(angle) * cross + (1 - math.cos(angle)) * cross @ cross
-    origin.set("rpy", hands.text(roll_pitch_yaw(rotation(_numbers(origin.get("rpy"))) @ turn)))
+    origin.set("rpy", hand_parts.text(roll_pitch_yaw(rotation(_numbers(origin.get("rpy"))) @ turn)))
     joint.set("type", "fixed")
     for tag in ("limit", "dynamics", "axis"):
         element = joint.find(tag)
@@ -164,7 +164,7 @@ def _motorise(robot: ET.Element) -> None:
             dynamics = ET.SubElement(joint, "dynamics")
         dynamics.set("damping", f"{DAMPING:g}")
         dynamics.set("friction", "0")
-        hands.add_actuator(robot, name)
+        hand_parts.add_actuator(robot, name)
 
 
 def _convert_meshes(robot: ET.Element, source: Path, folder: Path) -> None:
@@ -179,24 +179,42 @@ def _convert_meshes(robot: ET.Element, source: Path, folder: Path) -> None:
             target = path.stem + ".obj"
             if target not in written:
                 triangles = meshes.read_stl(path) * np.array(_numbers(mesh.get("scale"), "1 1 1"))
+                if link.get("name") in ("l_hand", "r_hand"):
+                    triangles = _without_fingers(robot, link, triangles)
                 meshes.write_obj(folder / target, *meshes.decimate(triangles, cell))
                 written.add(target)
             mesh.set("filename", target)
             mesh.attrib.pop("scale", None)
 
 
+def _without_fingers(robot: ET.Element, link: ET.Element, triangles: meshes.Array) -> meshes.Array:
+    """The hand's mesh with fingers and thumb pressed flat onto the palm, so that no hole stays."""
+
+    def pose(element: ET.Element | None) -> tuple[meshes.Array, meshes.Array]:
+        assert element is not None
+        return rotation(_numbers(element.get("rpy"))), np.array(_numbers(element.get("xyz")))
+
+    R_LM, p_LM = pose(link.find("visual/origin"))
+    R_LH, p_LH = pose(robot.find(f"joint[@name='{link.get('name')}_dh_frame_fixed_joint']/origin"))
+    p_H = (triangles @ R_LM.T + p_LM - p_LH) @ R_LH
+    p_H[..., 0] = np.minimum(p_H[..., 0], hands.PALM[1])
+    p_H[..., 1] = np.maximum(p_H[..., 1], -hands.PALM[2] / 2 - 0.004)
+    mesh: meshes.Array = (p_H @ R_LH.T + p_LH - p_LM) @ R_LM
+    return mesh
+
+
 def _add_forearm(link: ET.Element, side: str) -> None:
     capsule = ET.SubElement(link, "collision", name=f"{side}_forearm")
     away = -1.0 if side == "r" else 1.0
-    ET.SubElement(capsule, "origin", xyz=hands.text((away * 0.043, 0, 0.007)), rpy="0 0 0")
+    ET.SubElement(capsule, "origin", xyz=hand_parts.text((away * 0.043, 0, 0.007)), rpy="0 0 0")
     geometry = ET.SubElement(capsule, "geometry")
-    ET.SubElement(geometry, f"{hands.DRAKE}capsule", {key: f"{value:g}" for key, value in FOREARM.items()})
-    hands.add_contact(capsule, hands.FINGER_FRICTION)
+    ET.SubElement(geometry, f"{hand_parts.DRAKE}capsule", {key: f"{value:g}" for key, value in FOREARM.items()})
+    hand_parts.add_contact(capsule, hands.FINGER_FRICTION)
 
 
 def convert(folder: Path) -> Path:
     """Write `icub.urdf` and its meshes into `folder`; returns the URDF's path."""
-    ET.register_namespace("drake", hands.DRAKE.strip("{}"))
+    ET.register_namespace("drake", hand_parts.DRAKE.strip("{}"))
     source = _source()
     tree = ET.parse(source / "robots" / MODEL / "model.urdf")
     robot = tree.getroot()
@@ -206,8 +224,9 @@ def convert(folder: Path) -> Path:
     links = {link.get("name"): link for link in robot.findall("link")}
     for side in sorted(hands.PALM_SIGN):
         _add_forearm(links[f"{side}_forearm"], side)
-        hands.add_palm(links[f"{side}_hand_dh_frame"], side)
-        hands.add_fingers(robot, side)
+        hand_parts.add_palm(links[f"{side}_hand_dh_frame"], side)
+        hand_parts.add_fingers(robot, side)
+        hand_parts.add_gripper(robot, side)
     urdf = folder / "icub.urdf"
     tree.write(urdf, encoding="utf-8", xml_declaration=True)
     return urdf

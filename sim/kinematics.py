@@ -13,7 +13,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.solvers import SnoptSolver
 
 from cognitive_arch.world.observation import HANDS
-from sim.hands import FINGER_LENGTH, FINGER_OFFSET, PALM_SIGN, SIDES
+from sim.hands import FINGER_LENGTH, FINGER_OFFSET, PALM_SIGN, SIDES, is_hand_joint
 from sim.scenario import add_robot
 from sim.world import HOME, Joints
 
@@ -57,7 +57,7 @@ def palm_axis(hand: str) -> Vector:
 
 
 def fingertip(hand: str) -> Vector:
-    """The point between the two finger tips, in the hand frame, metres."""
+    """The point between the tips of the two pads when they are out, in the hand frame, metres."""
     return np.array([FINGER_OFFSET, 0.0, 0.0]) + FINGER_LENGTH * palm_axis(hand)
 
 
@@ -137,7 +137,7 @@ class Kinematics:
         q, program = problem.q(), problem.get_mutable_prog()
         for name, index in zip(self._names, self._index, strict=True):
             still = idle is None and name.startswith(f"{SIDES[other]}_")
-            if still or "finger" in name:
+            if still or is_hand_joint(name):
                 program.AddBoundingBoxConstraint(start[index], start[index], q[index])
         weights = np.zeros((len(start), len(start)))
         for name, index in zip(self._names, self._index, strict=True):
@@ -157,7 +157,7 @@ class Kinematics:
             )
 
     def _with_fingers_of(self, near: Joints, solution: Joints) -> Joints:
-        keep = ["finger" in name for name in self._names]
+        keep = [is_hand_joint(name) for name in self._names]
         return np.where(keep, near, solution)
 
     def line(

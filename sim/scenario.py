@@ -45,7 +45,7 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from cognitive_arch import shapes
 from cognitive_arch.domain import Domain, ObjectSpec, Scene
 from sim.assets import robot_urdf
-from sim.hands import PAD_RADIUS, PAD_STIFFNESS
+from sim.hands import PAD_RADIUS, PAD_STIFFNESS, is_hand_joint
 
 TIME_STEP = 0.004  # s
 TABLE_SIZE = (0.70, 0.90, 0.04)  # m
@@ -53,12 +53,14 @@ TABLE_CENTRE_X = -0.50  # m
 FRICTION = 0.8
 DISSIPATION = 1.0  # s/m, of the contact model
 ROLLING_TIME = 0.15  # s in which what rolls loses 63 % of its speed
-GAINS: Mapping[str, tuple[float, float]] = {  # N m/rad and N m s/rad; N/m and N s/m for the fingers
+GAINS: Mapping[str, tuple[float, float]] = {  # N m/rad and N m s/rad; N/m and N s/m for the pads
     "torso": (3000.0, 150.0),
     "shoulder": (1500.0, 60.0),
     "elbow": (800.0, 30.0),
     "wrist": (200.0, 6.0),
     "finger": (400.0, 20.0),
+    "carriage": (6000.0, 100.0),
+    "knuckle": (10.0, 0.2),
 }
 ROTOR_INERTIA, GEAR_RATIO = 1e-5, 100.0
 _TABLE_COLOR = [0.62, 0.50, 0.38, 1.0]
@@ -291,7 +293,7 @@ def _set_gains(plant: MultibodyPlant) -> None:
         actuator = plant.get_joint_actuator(index)
         kp, kd = next(gains for key, gains in GAINS.items() if key in actuator.name())
         actuator.set_controller_gains(PdControllerGains(p=kp, d=kd))
-        if "finger" not in actuator.name():
+        if not is_hand_joint(actuator.name()):
             actuator.set_default_rotor_inertia(ROTOR_INERTIA)
             actuator.set_default_gear_ratio(GEAR_RATIO)
 

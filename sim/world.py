@@ -14,7 +14,17 @@ from pydrake.multibody.plant import CoulombFriction
 from pydrake.systems.analysis import Simulator
 
 from cognitive_arch.domain import Domain, Placement, Scene
-from sim.hands import FINGER_FRICTION, SIDES, STROKE, finger_names
+from sim.hands import (
+    BENDS,
+    DRAWN_IN,
+    FINGER_FRICTION,
+    SIDES,
+    Posture,
+    carriage_name,
+    finger_names,
+    hand_links,
+    knuckle_names,
+)
 from sim.scenario import FRICTION, Scenario, build_scenario, resist_rolling
 
 Joints = NDArray[np.float64]
@@ -52,11 +62,13 @@ class World:
         self.joint_names = tuple(joint.name() for joint in joints)
         self._positions = np.array([joint.position_start() for joint in joints])
         self._desired = plant.get_desired_state_input_port(robot)
-        self._fingers = {
-            hand: [self.joint_names.index(name) for name in finger_names(side)]
-            for hand, side in SIDES.items()
-        }
-        self.home = np.array([HOME.get(n, STROKE if "finger" in n else 0.0) for n in self.joint_names])
+        self._fingers, self._carriages, self._knuckles = (
+            {hand: [self.joint_names.index(name) for name in names(side)] for hand, side in SIDES.items()}
+            for names in (finger_names, lambda side: (carriage_name(side),), knuckle_names)
+        )
+        self.home = np.array([HOME.get(name, 0.0) for name in self.joint_names])
+        for hand in SIDES:
+            self.home = self.with_pads_in(self.home, hand)
         self.command = self.home.copy()
         self.set_point = self.command  # what the controllers are being asked for at this moment
         self.on_send: Callable[[Joints, Joints], Joints] | None = (
@@ -234,13 +246,26 @@ class World:
         self.on_tick()
 
     def with_fingers(self, joints: Joints, hand: str, opening: float) -> Joints:
-        """`joints` with both fingers of `hand` at `opening` metres from the middle."""
+        """`joints` with both pads of `hand` out and `opening` metres from the middle."""
         changed = joints.copy()
         changed[self._fingers[hand]] = opening
+        changed[self._carriages[hand]] = 0.0
+        return changed
+
+    def with_pads_in(self, joints: Joints, hand: str) -> Joints:
+        """`joints` with the pads of `hand` closed and drawn into the palm."""
+        changed = self.with_fingers(joints, hand, 0.0)
+        changed[self._carriages[hand]] = DRAWN_IN
+        return changed
+
+    def with_posture(self, joints: Joints, hand: str, posture: Posture) -> Joints:
+        """`joints` with the four fingers of `hand` in that posture."""
+        changed = joints.copy()
+        changed[self._knuckles[hand]] = BENDS[posture]
         return changed
 
     def fingers(self, joints: Joints, hand: str) -> Joints:
-        """The two finger positions of `hand` within `joints`, metres."""
+        """The two pad positions of `hand` within `joints`, metres."""
         return joints[self._fingers[hand]]
 
     def arm_joints(self, hand: str) -> list[int]:
