@@ -31,7 +31,8 @@ EFFORT = {"torso": 80.0, "shoulder": 60.0, "elbow": 30.0, "wrist": 8.0}  # N m
 VELOCITY = 3.0  # rad/s
 DAMPING = 0.5  # N m s/rad
 NECK_DOWN = {"neck_pitch": -0.60}  # rad, looks at the table in front of the robot
-FOREARM = {"radius": 0.033, "length": 0.10}  # m
+FOREARM = {"radius": 0.033, "length": 0.10}  # m, a capsule along z of its link
+FOREARM_AT = {"l": (0.043, 0.0, 0.007), "r": (-0.043, 0.0, 0.007)}  # m, its middle
 _FIXED = re.compile(r"hip|knee|ankle|neck")
 _HIDDEN = re.compile(r"hip|knee|ankle|foot|sole|leg|root_link")
 _KEEP = re.compile(r"dh_frame|^imu|root_link|base_link")
@@ -41,7 +42,9 @@ def cache_folder() -> Path:
     """Folder of the converted model: its name changes with the versions and with this code."""
     base = os.environ.get("XDG_CACHE_HOME")
     root = Path(base) if base else Path.home() / ".cache"
-    recipe = "".join(inspect.getsource(part) for part in (hand_parts, hands, meshes)) + Path(__file__).read_text("utf-8")
+    recipe = "".join(inspect.getsource(part) for part in (hand_parts, hands, meshes)) + Path(
+        __file__
+    ).read_text("utf-8")
     digest = hashlib.sha256(recipe.encode("utf-8")).hexdigest()[:10]
     return root / "cognitive_arch" / f"icub-models-{version('icub-models')}-{digest}"
 
@@ -205,10 +208,11 @@ def _without_fingers(robot: ET.Element, link: ET.Element, triangles: meshes.Arra
 
 def _add_forearm(link: ET.Element, side: str) -> None:
     capsule = ET.SubElement(link, "collision", name=f"{side}_forearm")
-    away = -1.0 if side == "r" else 1.0
-    ET.SubElement(capsule, "origin", xyz=hand_parts.text((away * 0.043, 0, 0.007)), rpy="0 0 0")
+    ET.SubElement(capsule, "origin", xyz=hand_parts.text(FOREARM_AT[side]), rpy="0 0 0")
     geometry = ET.SubElement(capsule, "geometry")
-    ET.SubElement(geometry, f"{hand_parts.DRAKE}capsule", {key: f"{value:g}" for key, value in FOREARM.items()})
+    ET.SubElement(
+        geometry, f"{hand_parts.DRAKE}capsule", {key: f"{value:g}" for key, value in FOREARM.items()}
+    )
     hand_parts.add_contact(capsule, hands.FINGER_FRICTION)
 
 

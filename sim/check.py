@@ -1,4 +1,7 @@
-"""Success rates over jittered scenes: `python -m sim.check --what sandwich --what pull --hand left`."""
+"""Success rates over jittered scenes: `python -m sim.check --what sandwich --what pull --hand left`.
+
+Bare hands: `python -m sim.check --what tapFromLeft --hand right --posture bent`.
+"""
 
 from __future__ import annotations
 
@@ -9,10 +12,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from cognitive_arch.domain import Scene, load_domain, load_scene
+from cognitive_arch.domain import Placement, Scene, load_domain, load_scene
+from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.session import RunConfig, run_task
 from sim.environment import DrakeEnvironment
+from sim.hands import Posture
 
 MOVED = 0.10  # m that a tool has to move an object
 HAND_PAIRS = {
@@ -75,6 +80,81 @@ TOOL_TRIALS = {
 }
 
 
+@dataclass(frozen=True)
+class BareTrial:
+    """Do `verb` with the bare hand; `course` says which way (x, y) the object is to move, if it is."""
+
+    verb: str
+    course: tuple[float, float] | None = None
+
+
+BARE_TRIALS = {
+    "tapFromLeft": BareTrial("tapFromLeft", (0.0, 1.0)),
+    "tapFromRight": BareTrial("tapFromRight", (0.0, -1.0)),
+    "push-hand": BareTrial("push", (-1.0, 0.0)),
+    "pull-hand": BareTrial("pull", (1.0, 0.0)),
+    "touch": BareTrial("touch"),
+    "lift": BareTrial("lift"),
+}
+BARE_OBJECTS = ("Bun-bottom", "Ham", "Cheese")  # in turn, by the seed: high and low, round and square
+BARE_PLACE = (-0.36, 0.10)  # m, x and |y| on the hand's side
+BYSTANDER = Placement(position=(-0.58, 0.0))  # a tomato, not to be touched
+TAPPED, STILL, LIFTED = 0.025, 0.010, 0.05  # m
+SIDEWAYS = 0.5  # m aside per metre along the course, at most
+
+
+def bare_scene(obj: str, hand: str) -> Scene:
+    """One object in front of the hand, and one that is none of its business."""
+    side = -1.0 if hand == "LeftHand" else 1.0
+    place = Placement(position=(BARE_PLACE[0], side * BARE_PLACE[1]))
+    return Scene(name="bare", objects={obj: place, "Tomato": BYSTANDER})
+
+
+def use_hand(
+    environment: DrakeEnvironment, trial: BareTrial, obj: str, hand: str, posture: Posture, seed: int
+) -> tuple[bool, list[str], float]:
+    """One trial: did what is measured fit the skill; what it said; and how far it moved the object along
+    its course (lifted it; displaced it by touching), metres."""
+    environment.reset(seed)
+    environment.set_posture(hand, posture)
+    before = {name: environment.world.pose(name).translation() for name in (obj, "Tomato")}
+    result = environment.execute(GroundAction(trial.verb, (obj, hand)))
+    environment.settle(0.3)
+    dx, dy, _ = environment.world.pose(obj).translation() - before[obj]
+    aside = math.dist(environment.world.pose("Tomato").translation(), before["Tomato"])
+    if trial.course is not None:
+        measured = dx * trial.course[0] + dy * trial.course[1]
+        across = abs(dx * trial.course[1] - dy * trial.course[0])
+        ok = measured >= TAPPED and across <= SIDEWAYS * measured
+        said = f"{100 * measured:.1f} cm, {100 * across:.1f} cm aside"
+    elif trial.verb == "lift":
+        measured = result.effect.get("lift", 0.0)
+        ok = measured >= LIFTED and math.hypot(dx, dy) <= STILL and result.reason is FailureReason.NONE
+        said = f"{100 * measured:.1f} cm up, set down {1000 * math.hypot(dx, dy):.1f} mm away"
+    else:
+        measured = math.hypot(dx, dy)
+        ok = measured <= STILL and result.reason is FailureReason.NONE
+        said = f"{1000 * measured:.1f} mm"
+    return ok and aside < STILL, [obj, str(result.reason), said], measured
+
+
+def check_bare(
+    what: str, hand: str, posture: Posture, seeds: int, jitter: float
+) -> tuple[list[tuple[bool, list[str]]], str]:
+    """Trials with one hand on one object after the other; with the mean of what was measured."""
+    environments = {
+        obj: DrakeEnvironment(load_domain("sandwich"), bare_scene(obj, hand), jitter=jitter)
+        for obj in BARE_OBJECTS
+    }
+    results, sizes = [], []
+    for seed in range(seeds):
+        obj = BARE_OBJECTS[seed % len(BARE_OBJECTS)]
+        ok, said, measured = use_hand(environments[obj], BARE_TRIALS[what], obj, hand, posture, seed)
+        results.append((ok, said))
+        sizes.append(100 * measured)
+    return results, f"mean {sum(sizes) / seeds:.1f} cm, from {min(sizes):.1f} to {max(sizes):.1f}"
+
+
 def use_tool(environment: DrakeEnvironment, trial: ToolTrial, hand: str, seed: int) -> tuple[bool, list[str]]:
     """One trial: did the object move at least 10 cm the right way, the tool still being in the hand, and
     what each action said."""
@@ -118,20 +198,24 @@ def check_complex(seeds: int, jitter: float) -> list[tuple[bool, list[str]]]:
     return results
 
 
-def report(what: str, hand: str, seeds: int, jitter: float) -> None:
+def report(what: str, hand: str, seeds: int, jitter: float, posture: Posture = Posture.STRAIGHT) -> None:
     """Run one row of the table and print it."""
-    started = time.process_time()
+    started, more = time.process_time(), ""
     if what == "complex":
         results = check_complex(seeds, jitter)
     elif what == "sandwich":
         results = check_sandwich(hand, seeds, jitter)
+    elif what in BARE_TRIALS:
+        results, more = check_bare(what, f"{hand.capitalize()}Hand", posture, seeds, jitter)
+        more = f"  {posture}: {more}"
     else:
         results = check_tools(what, f"{hand.capitalize()}Hand", seeds, jitter)
     spent = (time.process_time() - started) / seeds
-    print(f"{what:<10} {hand:<6} {sum(ok for ok, _ in results):>4} of {seeds:<4} {spent:>8.1f}", flush=True)
+    done = sum(ok for ok, _ in results)
+    print(f"{what:<12} {hand:<6} {done:>4} of {seeds:<4} {spent:>8.1f}{more}", flush=True)
     for seed, (ok, said) in enumerate(results):
         if not ok:
-            print(f"           seed {seed}: {', '.join(said)}", flush=True)
+            print(f"             seed {seed}: {', '.join(said)}", flush=True)
 
 
 def main() -> None:
@@ -140,14 +224,19 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=20)
     parser.add_argument("--jitter", type=float, default=0.02, help="metres")
     parser.add_argument("--hand", choices=sorted(HAND_PAIRS), action="append")
-    parser.add_argument("--what", choices=["sandwich", *TOOL_TRIALS, "complex"], action="append")
+    parser.add_argument(
+        "--what", choices=["sandwich", *TOOL_TRIALS, *BARE_TRIALS, "complex"], action="append"
+    )
+    parser.add_argument("--posture", choices=[str(p) for p in Posture], action="append")
     options = parser.parse_args()
-    print("what       hand   done        CPU s each", flush=True)
+    print("what         hand   done        CPU s each", flush=True)
     for what in options.what or ["sandwich"]:
         hands = options.hand or (sorted(HAND_PAIRS) if what == "sandwich" else ["left", "right"])
         for hand in ["planned"] if what == "complex" else hands:
-            if what == "sandwich" or hand != "mixed":
-                report(what, hand, options.seeds, options.jitter)
+            if what != "sandwich" and hand == "mixed":
+                continue
+            for posture in options.posture or ["straight"] if what in BARE_TRIALS else ["straight"]:
+                report(what, hand, options.seeds, options.jitter, Posture(posture))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
+from sim.hands import Posture
 from sim.meddling import disturb
 from sim.noise import EpisodeNoise, PhysicalNoise
 from sim.pictures import LARGE, SMALL, Stage, View, save_picture, write_recording, write_video
@@ -94,23 +95,29 @@ class DrakeEnvironment:
         entry = SKILLS.get(action.name)
         if entry is None:
             return SkillResult(Outcome.FAILURE, FailureReason.UNKNOWN_SKILL)
-        wrong = unusable_arguments(self.robot, action, entry.n_objects)
-        if wrong is not None:
-            return SkillResult(Outcome.FAILURE, wrong)
+        perform = entry.form_for(action)
+        wrong = unusable_arguments(self.robot, action) if perform else FailureReason.UNKNOWN_OBJECT
+        if perform is None or wrong is not None:
+            return SkillResult(Outcome.FAILURE, wrong or FailureReason.UNKNOWN_OBJECT)
         let_go_of_lost(self.robot)
         started, name = self.world.time, action.args[0]
         before = self.world.pose(name).translation()
         hand = action.args[-1]
         held = self.robot.perception.held(hand)
         self.recorder.begin(str(action))
-        reason = entry.perform(self.robot, action.args)
+        self.robot.measured.clear()
+        reason = perform(self.robot, action.args)
         moved = self.world.pose(name).translation() - before
         effect = {f"displacement_{axis}": float(d) for axis, d in zip("xyz", moved, strict=True)}
         effect["duration"] = self.world.time - started
-        effect |= self.recorder.measured(hand, held, name)
+        effect |= self.recorder.measured(hand, held, name) | self.robot.measured
         self.recorder.begin()
         outcome = Outcome.SUCCESS if reason is FailureReason.NONE else Outcome.FAILURE
         return SkillResult(outcome, reason, effect)
+
+    def set_posture(self, hand: str, posture: Posture) -> None:
+        """Straight, bent or arched fingers for one hand; raises `ValueError` if it holds something."""
+        self.robot.set_posture(hand, posture)
 
     def disturb(self, event: OutsideEvent) -> tuple[str, ...]:
         """See `Environment.disturb`."""

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 import xml.etree.ElementTree as ET
 from collections.abc import Sequence
 
 from sim.hands import (
     DRAWN_IN,
-    FINGER_FRICTION,
     FINGER_FORCE,
+    FINGER_FRICTION,
     FINGER_LENGTH,
     FINGER_OFFSET,
     FINGER_RADIUS,
@@ -160,9 +161,11 @@ def add_palm(hand: ET.Element, side: str) -> None:
     add_contact(
         add_box(hand, "collision", f"{side}_palm", centre, (front - rear, width, depth)), FINGER_FRICTION
     )
-    for n, ((x0, y0, d0), (x1, y1, d1)) in enumerate(zip(THUMB, THUMB[1:], strict=False)):
+    for n, ((x0, y0, d0), (x1, y1, d1)) in enumerate(itertools.pairwise(THUMB)):
         color = _RUBBER if n == len(THUMB) - 2 else _SHELL
-        _add_limb(hand, f"{side}_thumb_{n + 1}", (x0, y0, -out * d0), (x1, y1, -out * d1), THUMB_RADIUS, color)
+        _add_limb(
+            hand, f"{side}_thumb_{n + 1}", (x0, y0, -out * d0), (x1, y1, -out * d1), THUMB_RADIUS, color
+        )
     # Where the mesh's fingers were cut off, and where the pads' stems come out on the back.
     bar = (KNUCKLE[0] - 0.002, 0, -out * (KNUCKLE[1] + 0.002))
     add_box(hand, "visual", f"{side}_knuckles", bar, (0.016, width, 2 * FINGER_RADIUS + 0.004))

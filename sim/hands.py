@@ -10,6 +10,7 @@ image in z.
 
 from __future__ import annotations
 
+import itertools
 import math
 import re
 from collections.abc import Mapping
@@ -120,9 +121,9 @@ def limbs(side: str, posture: Posture) -> list[Limb]:
     parts = [
         Limb((x0, y, -out * d0), (x1, y, -out * d1), FINGER_RADIUS)
         for y in FINGERS_AT
-        for (x0, d0), (x1, d1) in zip(line, line[1:], strict=False)
+        for (x0, d0), (x1, d1) in itertools.pairwise(line)
     ]
-    for (x0, y0, d0), (x1, y1, d1) in zip(THUMB, THUMB[1:], strict=False):
+    for (x0, y0, d0), (x1, y1, d1) in itertools.pairwise(THUMB):
         parts.append(Limb((x0, y0, -out * d0), (x1, y1, -out * d1), THUMB_RADIUS))
     rear, front, width, depth = PALM
     half = width / 4

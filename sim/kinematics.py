@@ -84,9 +84,12 @@ class Kinematics:
 
     def hand_pose(self, hand: str, joints: Joints) -> RigidTransform:
         """X_WH at `joints`."""
+        return self.link_pose(f"{SIDES[hand]}_hand_dh_frame", joints)
+
+    def link_pose(self, link: str, joints: Joints) -> RigidTransform:
+        """X_WL of a link of the robot at `joints`."""
         self.plant.SetPositions(self._context, self._full(joints))
-        frame = self.plant.GetFrameByName(f"{SIDES[hand]}_hand_dh_frame")
-        return frame.CalcPoseInWorld(self._context)
+        return self.plant.GetFrameByName(link).CalcPoseInWorld(self._context)
 
     def solve(
         self,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pydrake.multibody.tree import BodyIndex
 
 from cognitive_arch.runlog.trajectory import Trajectory
-from sim.hands import SIDES
+from sim.hands import SIDES, hand_links
 from sim.world import Joints, World
 
 KEEP_EVERY = 4  # ticks: 12.5 samples per second
@@ -130,7 +130,7 @@ class Recorder:
 
         `held` is what `hand` works with (a tool), `name` the object worked on.
         """
-        links = {body for body in self._bodies if _of_hand(body, SIDES[hand])}
+        links = hand_links(SIDES[hand])
         manipulator = (links | {held} if held else links) - {name}
         others = set(self._objects) - manipulator - {name}
         speeds = [tick.speeds for tick in self._ticks]
@@ -201,11 +201,6 @@ def _length(vector: Joints) -> float:
 
 def _ordered(a: str, b: str) -> Pair:
     return (a, b) if a < b else (b, a)
-
-
-def _of_hand(body: str, side: str) -> bool:
-    """Palm and fingers; the forearm is no part of the hand."""
-    return body.startswith(f"{side}_") and "arm" not in body
 
 
 def _samples(trajectory: Trajectory) -> Iterable[Sample]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from cognitive_arch.domain import Domain, ReachLimits, Scene
 from cognitive_arch.world.observation import HANDS
-from sim.hands import SIDES
+from sim.hands import SIDES, Posture, is_hand_joint
 from sim.kinematics import (
     APPROACH,
     DOWN,
@@ -29,6 +29,7 @@ LEVEL, TILTS = 0.03, (0.05, 0.15, 0.30)  # rad
 YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing direction
 CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may be moved meanwhile
 TOOL_TILT, TOOL_TURN = 0.06, 0.15  # rad, the same for a hand with a tool
+POSTURE_TIME = 0.6  # s to bend the fingers
 TRANSIT_SPEED = 0.9  # rad/s of the fastest joint between poses
 
 
@@ -58,7 +59,8 @@ def _other(hand: str) -> str:
 
 @dataclass
 class Robot:
-    """The iCub as skills see it. `grips` says how each full hand holds what it holds;
+    """The iCub as skills see it. `grips` says how each full hand holds what it holds, `postures` what the
+    fingers of each hand do, `measured` what the skill at work has measured (SI units);
     `reach` are constants that perception tells reach by, None for the arms' kinematics."""
 
     domain: Domain
@@ -68,6 +70,8 @@ class Robot:
     rng: np.random.Generator
     grips: dict[str, Grip] = field(default_factory=dict)
     reach: ReachLimits | None = None
+    postures: dict[str, Posture] = field(default_factory=lambda: dict.fromkeys(HANDS, Posture.STRAIGHT))
+    measured: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self.kinematics = Kinematics(self.world.joint_names, self.scene.table.height)
@@ -78,12 +82,22 @@ class Robot:
         return {
             "grips": {hand: grip.to_json() for hand, grip in sorted(self.grips.items())},
             "noise": self.noise.save(),
+            "postures": {hand: str(posture) for hand, posture in sorted(self.postures.items())},
         }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """The inverse of `save`."""
         self.grips = {hand: Grip.from_json(grip) for hand, grip in saved["grips"].items()}
         self.noise.restore(saved["noise"])
+        self.postures = {hand: Posture(saved["postures"][hand]) for hand in HANDS}
+
+    def set_posture(self, hand: str, posture: Posture) -> None:
+        """Bend the four fingers of a hand; raises `ValueError` if it holds something."""
+        if hand in self.grips and posture is not Posture.STRAIGHT:
+            raise ValueError(f"{hand} holds something; its fingers stay {Posture.STRAIGHT}")
+        if posture is not self.postures[hand]:
+            self.world.follow([self.world.with_posture(self.world.command, hand, posture)], POSTURE_TIME)
+            self.postures[hand] = posture
 
     def top_of(self, name: str) -> float:
         """Height of an object's upper face, metres."""
@@ -109,22 +123,25 @@ class Robot:
 
     def rest(self, hand: str) -> Joints:
         """The home posture for torso and `hand`; the other arm, and with it the torso, home or carrying;
-        fingers as commanded.
+        fingers as commanded, the pads of an empty hand drawn in.
 
         Inverse kinematics starts from here, so that postures do not wander off over many actions.
         """
         other = _other(hand)
+        command = self.world.command
+        if hand not in self.grips:
+            command = self.world.with_pads_in(command, hand)
         if other not in self.grips:
-            return np.where(self._arm_joints(hand, "torso"), self.world.home, self.world.command)
+            return np.where(self._arm_joints(hand, "torso"), self.world.home, command)
         # The torso goes back to where the other arm's posture was solved for: with any other lean the
         # same arm joints may lower a tool onto the table.
-        joints = np.where(self._arm_joints(hand), self.world.home, self.world.command)
+        joints = np.where(self._arm_joints(hand), self.world.home, command)
         joints = np.where(self._arm_joints(other, "torso"), self.grips[other].carrying, joints)
         return joints
 
     def _arm_joints(self, hand: str, *more: str) -> list[bool]:
         prefixes = (f"{SIDES[hand]}_", *more)
-        return [n.startswith(prefixes) and "finger" not in n for n in self.world.joint_names]
+        return [n.startswith(prefixes) and not is_hand_joint(n) for n in self.world.joint_names]
 
     def idle_target(self, hand: str) -> HandTarget | None:
         """Where the other hand stays, level, while `hand` works; None if it holds nothing."""
@@ -144,7 +161,7 @@ class Robot:
         return replace(target, tilt=TOOL_TILT, fingers_W=fingers_W, yaw_tolerance=TOOL_TURN)
 
     def go_home(self, hand: str) -> None:
-        """Back to the home posture with one arm, fingers as they are."""
+        """Back to the home posture with one arm; an empty hand draws its pads in."""
         self.travel(self.rest(hand))
 
     def grasp_targets(self, hand: str, p_WP: Vector, yaws: tuple[float, ...]) -> list[HandTarget]:

@@ -166,6 +166,11 @@ class World:
                 pairs.update({(a, b), (b, a)})
         return frozenset(pairs)
 
+    def hand_touches(self, hand: str, name: str) -> bool:
+        """Whether some part of the hand presses on an object now."""
+        links = hand_links(SIDES[hand])
+        return any(a in links and b == name for a, b in self.contacts())
+
     # -- keeping ------------------------------------------------------------------------------------
 
     def save(self) -> dict[str, Any]:
@@ -218,8 +223,13 @@ class World:
     def _ask(self, position: Joints, velocity: Joints) -> None:
         self._desired.FixValue(self._plant_context, np.concatenate([position, velocity]))
 
-    def follow(self, waypoints: Sequence[Joints], seconds: float) -> None:
-        """Move the set point through `waypoints`, (n_joints,) each, with a minimum-jerk time scaling."""
+    def follow(
+        self, waypoints: Sequence[Joints], seconds: float, until: Callable[[], bool] | None = None
+    ) -> None:
+        """Move the set point through `waypoints`, (n_joints,) each, with a minimum-jerk time scaling.
+
+        `until` is asked after every set point; where it says yes, the set point stays.
+        """
         path = np.vstack([self.command, *waypoints])
         pieces = len(path) - 1
         ticks = max(1, round(seconds / COMMAND_PERIOD))
@@ -232,6 +242,8 @@ class World:
             self._send(point, (point - previous) / COMMAND_PERIOD)
             self._advance(start + seconds * u)
             previous = point
+            if until is not None and until():
+                break
         self.command = previous
         self._send(previous, np.zeros(len(previous)))
 

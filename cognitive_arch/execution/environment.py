@@ -37,6 +37,9 @@ class FailureReason(StrEnum):
     SLIPPED = "slipped"  # it was held and got lost on the way
     NOT_A_TOOL = "not_a_tool"  # what the hand holds is no tool
     CANNOT_PULL = "cannot_pull"  # the tool has nothing to get behind an object with
+    BLOCKED = "blocked"  # something is in the way of the hand or of the object
+    OFF_TABLE = "off_table"  # the object would fall off the table, or did
+    NO_CONTACT = "no_contact"  # the hand never touched the object
     MISPLACED = "misplaced"  # it was released and does not rest where it should
     NO_EFFECT = "no_effect"  # carried out, nothing observable changed
     UNEXPECTED_EFFECT = "unexpected_effect"  # something changed, but not what the rule's first outcome says

@@ -14,10 +14,10 @@ Skill = Callable[[Robot, tuple[str, ...]], FailureReason]
 Whether it had the intended effect is for the observation afterwards to say."""
 
 
-def unusable_arguments(robot: Robot, action: GroundAction, n_objects: int) -> FailureReason | None:
+def unusable_arguments(robot: Robot, action: GroundAction) -> FailureReason | None:
     """Why the arguments (objects, then one hand) cannot be worked with, if so."""
     *objects, hand = action.args if action.args else ("",)
-    if len(action.args) != n_objects + 1 or hand not in HANDS or len(set(objects)) < len(objects):
+    if hand not in HANDS or len(set(objects)) < len(objects):
         return FailureReason.UNKNOWN_OBJECT
     seen = {obj.name for obj in robot.perception.observe().objects}
     return None if set(objects) <= seen else FailureReason.UNKNOWN_OBJECT

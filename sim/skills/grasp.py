@@ -9,7 +9,7 @@ import numpy as np
 
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
-from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, HANDLE, STROKE
+from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, HANDLE, STROKE, Posture
 from sim.kinematics import DOWN, HandTarget, Vector, palm_axis
 from sim.robot import YAWS, Grip, Robot
 from sim.skills.base import release
@@ -28,38 +28,47 @@ CARRY_HEIGHT = 0.17  # m above the table
 def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
     name, hand = args
+    reason, _ = pick_up(robot, name, hand)
+    if reason is not FailureReason.NONE:
+        return reason
+    if robot.domain.objects[name].shape.type == "tool":
+        carry_tool(robot, hand, name)
+    else:
+        carry(robot, hand)
+    return FailureReason.NONE if robot.perception.held(hand) == name else FailureReason.SLIPPED
+
+
+def pick_up(robot: Robot, name: str, hand: str) -> tuple[FailureReason, list[Joints]]:
+    """Take an object and raise it; returns why not, or `NONE`, and the waypoints from it upwards."""
     obstacle = _obstacle(robot, name, hand)
     if obstacle is not None:
-        return obstacle
+        return obstacle, []
     aim = robot.noise.aim(hand, "grasp")
     width, yaws = grip_choices(robot, name)
     # A tool is a lever that wants to turn in the hand: the fingers press on it as hard as they can.
     is_tool = robot.domain.objects[name].shape.type == "tool"
     squeeze = (FIRM_SQUEEZE if is_tool else SQUEEZE) * robot.noise.grip(hand)
     closed = width / 2 - squeeze if is_tool else max(0.0, width / 2 - squeeze)
+    robot.set_posture(hand, Posture.STRAIGHT)
     grip = Grip(min(STROKE, width / 2 + MARGIN), closed, yaws, robot.world.home)
     plan = _plan(robot, name, hand, grip, aim)
     if plan is None:
-        return FailureReason.OUT_OF_REACH
+        return FailureReason.OUT_OF_REACH, []
     start, down = plan
     world = robot.world
     robot.travel(world.with_fingers(start, hand, grip.opening))
     world.follow([world.with_fingers(q, hand, grip.opening) for q in down], 1.0)
     world.move_fingers(hand, grip.closed, 0.5)
     world.hold(0.15)
-    up = [world.with_fingers(q, hand, grip.closed) for q in [*down[-2::-1], start]]
-    world.follow(up, 1.0)
+    way_up = [*down[::-1], start]
+    world.follow([world.with_fingers(q, hand, grip.closed) for q in way_up[1:]], 1.0)
     world.hold(0.1)
     if robot.perception.held(hand) != name:
         release(robot, hand, STROKE)
         robot.go_home(hand)
-        return FailureReason.NOT_GRASPED
+        return FailureReason.NOT_GRASPED, []
     robot.grips[hand] = grip
-    if robot.domain.objects[name].shape.type == "tool":
-        carry_tool(robot, hand, name)
-    else:
-        carry(robot, hand)
-    return FailureReason.NONE if robot.perception.held(hand) == name else FailureReason.SLIPPED
+    return FailureReason.NONE, way_up
 
 
 def _obstacle(robot: Robot, name: str, hand: str) -> FailureReason | None:
