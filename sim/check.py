@@ -107,7 +107,7 @@ def bare_scene(obj: str, hand: str) -> Scene:
     """One object in front of the hand, and one that is none of its business."""
     side = -1.0 if hand == "LeftHand" else 1.0
     place = Placement(position=(BARE_PLACE[0], side * BARE_PLACE[1]))
-    return Scene(name="bare", objects={obj: place, "Tomato": BYSTANDER})
+    return Scene(name="bare", objects={obj: place, "Tomato": BYSTANDER}, events=())
 
 
 def use_hand(

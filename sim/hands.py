@@ -95,12 +95,13 @@ def is_hand_joint(name: str) -> bool:
 
 @dataclass(frozen=True)
 class Limb:
-    """A rounded part of a hand: all points within `radius` of the segment from `a` to `b`, metres, in the
-    hand frame."""
+    """A rounded part of a hand, a finger's or not: all points within `radius` of the segment from `a` to
+    `b`, metres, in the hand frame."""
 
     a: tuple[float, float, float]
     b: tuple[float, float, float]
     radius: float
+    finger: bool = False
 
 
 def finger_line(posture: Posture) -> list[tuple[float, float]]:
@@ -119,7 +120,7 @@ def limbs(side: str, posture: Posture) -> list[Limb]:
     out = PALM_SIGN[side]
     line = finger_line(posture)
     parts = [
-        Limb((x0, y, -out * d0), (x1, y, -out * d1), FINGER_RADIUS)
+        Limb((x0, y, -out * d0), (x1, y, -out * d1), FINGER_RADIUS, finger=True)
         for y in FINGERS_AT
         for (x0, d0), (x1, d1) in itertools.pairwise(line)
     ]

@@ -13,6 +13,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.solvers import SnoptSolver
 
 from cognitive_arch.world.observation import HANDS
+from sim.assets import FOREARM, FOREARM_AT
 from sim.hands import FINGER_LENGTH, FINGER_OFFSET, PALM_SIGN, SIDES, is_hand_joint
 from sim.scenario import add_robot
 from sim.world import HOME, Joints
@@ -21,6 +22,7 @@ Vector = NDArray[np.float64]
 TORSO_COST, ARM_COST = 2.0, 0.3  # moving the torso moves everything, so arms go first
 POSITION_TOLERANCE = 0.001  # m
 HAND_CLEARANCE = 0.06  # m that both wrists keep above the table
+FOREARM_CLEARANCE = 0.008  # m that a forearm keeps above the table where that is asked for
 MAX_LEAN = 0.40  # rad that the torso may lean forward; farther, and the head hangs over the table
 APPROACH = 0.09  # m above its target that a hand comes down from
 REACH_MARGIN = 0.008  # m: where a hand only just gets to, it cannot turn as an object asks for
@@ -34,7 +36,8 @@ class HandTarget:
 
     The point `p_HP` of the hand frame (metres) is to be at `p_WP`, give or take `tolerance`; the hand's
     direction `axis_H` within `tilt` radians of `axis_W`; and, if given, its y axis (along which the
-    fingers close) within `yaw_tolerance` of `fingers_W`.
+    fingers close) within `yaw_tolerance` of `fingers_W`. With `forearm_clear` the elbow is not lowered onto
+    the table either: a hand that stands upright or reaches low would ask for that.
     """
 
     p_HP: Vector
@@ -45,10 +48,17 @@ class HandTarget:
     fingers_W: Vector | None = None
     yaw_tolerance: float = 0.08
     tolerance: float = POSITION_TOLERANCE
+    forearm_clear: bool = False
 
     def at(self, p_WP: Vector) -> HandTarget:
         """The same demand at another place."""
         return replace(self, p_WP=p_WP)
+
+
+def forearm_ends(side: str) -> tuple[Vector, Vector]:
+    """Both ends of the forearm's capsule, metres, in the frame of its link."""
+    centre, half = np.array(FOREARM_AT[side]), np.array([0.0, 0.0, FOREARM["length"] / 2])
+    return centre - half, centre + half
 
 
 def palm_axis(hand: str) -> Vector:
@@ -154,6 +164,11 @@ class Kinematics:
         margin = np.full(3, target.tolerance)
         problem.AddPositionConstraint(frame, target.p_HP, world, target.p_WP - margin, target.p_WP + margin)
         problem.AddAngleBetweenVectorsConstraint(frame, target.axis_H, world, target.axis_W, 0, target.tilt)
+        if target.forearm_clear:
+            low = np.array([-2.0, -2.0, self._table_height + FOREARM["radius"] + FOREARM_CLEARANCE])
+            forearm = self.plant.GetFrameByName(f"{SIDES[hand]}_forearm")
+            for p_FE in forearm_ends(SIDES[hand]):
+                problem.AddPositionConstraint(forearm, p_FE, world, low, np.full(3, 2.0))
         if target.fingers_W is not None:
             problem.AddAngleBetweenVectorsConstraint(
                 frame, np.array([0.0, 1.0, 0.0]), world, target.fingers_W, 0, target.yaw_tolerance

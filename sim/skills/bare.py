@@ -15,10 +15,10 @@ from pydrake.math import RigidTransform
 
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
-from sim.assets import FOREARM, FOREARM_AT
+from sim.assets import FOREARM
 from sim.footprint import Capsule, Point, footprint, smallest_gap
 from sim.hands import BENDS, PALM_SIGN, SIDES, Posture, limbs
-from sim.kinematics import HandTarget, Vector, palm_axis
+from sim.kinematics import HandTarget, Vector, forearm_ends, palm_axis
 from sim.robot import Robot
 from sim.scenario import TABLE_CENTRE_X, TABLE_SIZE
 from sim.skills.tool import obstacles
@@ -38,6 +38,7 @@ SLANT = 0.7  # of its way that an object has to move along the course
 COURSES = (0.0, 0.25, -0.25)  # rad from the commanded direction
 SKEWS = (0.0, 0.3, -0.3)  # rad from the hand's straight position
 DISTANCES = (0.085, 0.06)  # m that a sweep goes on from the first contact
+FACED = 0.6  # of its height: what meets an object only higher up than that does not move it
 _TIE = 0.001  # m; finger tips as low as the lowest
 _FACE = 0.008  # m; parts of the hand as far ahead as the first
 _PIECE = 0.03  # m between two waypoints, or two looks at what is in the way
@@ -51,6 +52,7 @@ class Part:
     a: Vector
     b: Vector
     radius: float
+    finger: bool
 
     def points(self) -> Iterator[Vector]:
         """Middles along the limb."""
@@ -73,13 +75,26 @@ class Stance:
 
     def target(self, p_WL: Vector) -> HandTarget:
         """The hand pose that brings the lowest point to `p_WL`, metres."""
-        return HandTarget(self.p_HL, p_WL, palm_axis(self.hand), self.palm_W, TILT, self.y_W, TILT)
+        return HandTarget(
+            self.p_HL,
+            p_WL,
+            palm_axis(self.hand),
+            self.palm_W,
+            TILT,
+            fingers_W=self.y_W,
+            yaw_tolerance=TILT,
+            forearm_clear=True,
+        )
 
     def front(self, course: Point, below: float) -> tuple[float, float]:
         """Where the hand meets what is `below` metres high: how far ahead of the lowest point, and how far
         to the left of the course, metres."""
         across = (-course[1], course[0])
-        points = [(p, part.radius) for part in self.parts for p in part.points()]
+        # What is drawn closer is behind the fingers; the palm is over it and has nothing to do with it.
+        drawing = self.x_W[0] * course[0] + self.x_W[1] * course[1] < -0.5
+        points = [
+            (p, part.radius) for part in self.parts if part.finger or not drawing for p in part.points()
+        ]
         limit = max(below, min(p[2] - r for p, r in points) + _TIE)
         low = [
             (p[0] * course[0] + p[1] * course[1] + r, p[0] * across[0] + p[1] * across[1])
@@ -123,7 +138,7 @@ def stance(hand: str, posture: Posture, heading: float, pitch: float, roll: floa
     lowest = [end for end, z in zip(ends, undersides, strict=True) if z < min(undersides) + _TIE]
     p_HL = np.mean([p for p, _ in lowest], axis=0)
     parts = tuple(
-        Part(R_WH @ (np.array(limb.a) - p_HL), R_WH @ (np.array(limb.b) - p_HL), limb.radius)
+        Part(R_WH @ (np.array(limb.a) - p_HL), R_WH @ (np.array(limb.b) - p_HL), limb.radius, limb.finger)
         for limb in shape
     )
     return Stance(hand, x_W, y_W, palm_W, p_HL, lowest[0][1], parts)
@@ -259,7 +274,7 @@ def _sweep(
             place[1] + along * course[1] + aside * course[0],
         )
 
-    ahead, aside = held.front(course, height - held.radius - FLOAT)
+    ahead, aside = held.front(course, FACED * height - held.radius - FLOAT)
     start = at(-behind - GAP - ahead, -aside)
     # Straight fingers reach over the object: where they would come down on it, the whole hand stays higher.
     over = [
@@ -313,9 +328,7 @@ def forearm_is_clear(robot: Robot, hand: str, joints: Joints, others: dict[str, 
     """Whether the forearm touches neither the table nor anything on it at `joints`."""
     side = SIDES[hand]
     X_WF = robot.kinematics.link_pose(f"{side}_forearm", joints)
-    centre = np.array(FOREARM_AT[side])
-    half = np.array([0.0, 0.0, FOREARM["length"] / 2])
-    a, b = X_WF @ (centre - half), X_WF @ (centre + half)
+    a, b = (X_WF @ end for end in forearm_ends(side))
     radius = FOREARM["radius"]
     underside = float(min(a[2], b[2])) - radius - robot.scene.table.height
     arm = Capsule((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), radius)

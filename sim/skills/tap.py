@@ -10,19 +10,27 @@ import math
 
 from cognitive_arch.execution.environment import FailureReason
 from sim.robot import Robot
-from sim.skills.bare import sweep_object
+from sim.skills.bare import sweep_object, upright_pitch
 
 TO_RIGHT, TO_LEFT = math.pi / 2, -math.pi / 2  # rad; the robot looks along -x
-PITCHES = (0.30, 0.15, 0.45, 0.60)  # rad by which the fingers point down
+LEAST = 0.30  # rad by which the hand points down, at least: its wrist has to clear the table
+MORE_OR_LESS = (0.0, 0.12, -0.12)  # rad from the best pitch
 
 
 def tap_from_left(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
-    obj, hand = args
-    return sweep_object(robot, obj, hand, TO_RIGHT, [(math.pi / 2, p, math.pi / 2) for p in PITCHES])
+    return _tap(robot, args, TO_RIGHT)
 
 
 def tap_from_right(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
+    return _tap(robot, args, TO_LEFT)
+
+
+def _tap(robot: Robot, args: tuple[str, ...], towards: float) -> FailureReason:
     obj, hand = args
-    return sweep_object(robot, obj, hand, TO_LEFT, [(-math.pi / 2, p, math.pi / 2) for p in PITCHES])
+    # Straight fingers meet the object with their tips, bent ones with all their length.
+    best = max(LEAST, upright_pitch(robot.postures[hand]))
+    return sweep_object(
+        robot, obj, hand, towards, [(towards, best + more, math.pi / 2) for more in MORE_OR_LESS]
+    )
