@@ -116,7 +116,8 @@ def finger_line(posture: Posture) -> list[tuple[float, float]]:
 
 
 def limbs(side: str, posture: Posture) -> list[Limb]:
-    """What a hand with its pads drawn in consists of: the phalanges, the thumb, and the palm's two halves."""
+    """What a hand with its pads drawn in consists of: phalanges, thumb, the palm's two halves, the pads'
+    tips in the palm, and their housing on its back."""
     out = PALM_SIGN[side]
     line = finger_line(posture)
     parts = [
@@ -131,6 +132,8 @@ def limbs(side: str, posture: Posture) -> list[Limb]:
     for y in (-half, half):
         centre = -out * depth / 2
         parts.append(Limb((rear + half, y, centre), (front - half, y, centre), half))
+    pads, end = -out * (DRAWN_IN - FINGER_LENGTH + FINGER_THICKNESS), FINGER_WIDTH / 2 - FINGER_THICKNESS
+    parts.append(Limb((FINGER_OFFSET - end, 0, pads), (FINGER_OFFSET + end, 0, pads), FINGER_THICKNESS))
     (x, _, deep), (thick, wide, high) = HOUSING
     end, centre = wide / 2 - thick / 2, -out * (deep + high / 2 - thick / 2)
     parts.append(Limb((x, -end, centre), (x, end, centre), thick / 2))

@@ -282,7 +282,7 @@ def _sweep(
         for part, underside in held.covers(start, FLOAT)
         if underside < height + OVER and smallest_gap([part], body) < OVER
     ]
-    rise = height + OVER - min(over) if over else 0.0
+    rise = height + 2 * OVER - min(over) if over else 0.0
     end = at(-behind + distance - ahead, -aside)
     return Sweep(held, start, end, FLOAT + rise, (distance * course[0], distance * course[1]))
 
