@@ -56,6 +56,7 @@ class SkillResult:
     - `duration`: how long the action took, s;
     - `contact_duration`: how long the manipulator (the hand, or the tool it holds) touched the first
       argument, s; `object_contact_duration`: how long other objects touched it, s;
+    - `lift`: how much higher the first argument was while it was held up, m (only `lift`);
     - `hand_speed`, `object_speed`: how fast hand and first argument were at most, m/s.
     """
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 
 import numpy as np
@@ -156,3 +157,14 @@ def test_straight_fingers_pull_nothing(domain: Domain) -> None:
         assert (result.outcome is Outcome.SUCCESS) == (posture is Posture.ARCHED)
     assert abs(moved[Posture.STRAIGHT]) < 0.005
     assert moved[Posture.ARCHED] > 2 * TAPPED
+
+
+def test_postures_are_part_of_the_saved_state(crowded: DrakeEnvironment) -> None:
+    crowded.reset(0)
+    crowded.set_posture("RightHand", Posture.ARCHED)
+    saved = json.loads(json.dumps(crowded.save()))
+    crowded.set_posture("RightHand", Posture.STRAIGHT)
+    crowded.restore(saved)
+    assert crowded.robot.postures == {"LeftHand": Posture.STRAIGHT, "RightHand": Posture.ARCHED}
+    knuckle = crowded.world.joint_names.index("r_knuckle_2")
+    assert crowded.world.joints()[knuckle] == pytest.approx(BENDS[Posture.ARCHED][1], abs=0.05)
