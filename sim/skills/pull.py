@@ -23,6 +23,7 @@ from sim.skills.tool import (
     is_free,
     obstacles,
     perform,
+    spread_idle_arm,
     unusable,
 )
 
@@ -48,6 +49,7 @@ def pull(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     if tool is None or tool.shape.bar <= 0:
         return FailureReason.CANNOT_PULL
     tool = tool.with_head_off(robot.noise.head("pull"))
+    spread_idle_arm(robot, hand)
     motion = first_feasible(robot, tool, _sweeps(robot, tool, obj))
     return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
 

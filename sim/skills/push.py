@@ -22,6 +22,7 @@ from sim.skills.tool import (
     is_free,
     obstacles,
     perform,
+    spread_idle_arm,
     unusable,
 )
 
@@ -43,6 +44,7 @@ def push(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     if tool is None:
         return FailureReason.NOT_A_TOOL
     tool = tool.with_head_off(robot.noise.head("push"))
+    spread_idle_arm(robot, hand)
     motion = first_feasible(robot, tool, _sweeps(robot, tool, obj))
     return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
 

@@ -14,7 +14,7 @@ from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.shapes import ToolShape
 from cognitive_arch.world.observation import HANDS
 from sim.footprint import Capsule, Point, disc, footprint, smallest_gap
-from sim.hands import FINGER_WIDTH, STROKE
+from sim.hands import FINGER_WIDTH, SIDES, STROKE
 from sim.kinematics import HandTarget, Vector
 from sim.robot import Robot
 from sim.skills.base import release
@@ -32,6 +32,7 @@ PITCHES = (0.0, 0.08, 0.15)  # rad by which the handle may be higher than the he
 NEAREST = (-0.20, 0.08)  # m, x and |y|: nearer to its own body a hand hardly gets, nor to the other side
 FARTHEST = -0.46  # m: farther away it gets only straight ahead
 PALM_HEIGHT = 0.045  # m above the table: what is taller must not be under the palm
+IDLE_ROLL = 1.3  # rad of an idle arm's shoulder while the other one sweeps a tool
 _SHAFT_PARTS = 6
 _PIECE = 0.03  # m between two waypoints, or two looks at what is in the way
 
@@ -199,6 +200,17 @@ def is_free(robot: Robot, tool: HeldTool, sweep: Sweep, others: dict[str, tuple[
             ):
                 return False
     return True
+
+
+def spread_idle_arm(robot: Robot, hand: str) -> None:
+    """Take the other arm, if it is empty, farther out: with a turned torso its forearm comes to where a
+    raised tool passes, and knocked against it the tool turns in the hand and is lost."""
+    other = next(h for h in HANDS if h != hand)
+    if other in robot.grips:
+        return
+    joints = robot.world.command.copy()
+    joints[robot.world.joint_names.index(f"{SIDES[other]}_shoulder_roll")] = IDLE_ROLL
+    robot.travel(joints)
 
 
 def first_feasible(robot: Robot, tool: HeldTool, sweeps: Iterable[Sweep], limit: int = 30) -> Motion | None:
