@@ -242,7 +242,7 @@ class PhysicalNoise:
         SlipperyFingers(loss=0.5),
         WeakGrip(power=1.5),
     )
-    pull: tuple[ToolPart, ...] = (HeadError(half=0.012), HeadLift(sigma=0.008))
+    pull: tuple[ToolPart, ...] = (HeadError(half=0.015), HeadLift(sigma=0.008))
     push: tuple[ToolPart, ...] = (HeadError(half=0.0255), HeadLift(sigma=0.020))
 
     def level(self, capability: str) -> float:
