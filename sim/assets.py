@@ -33,6 +33,13 @@ DAMPING = 0.5  # N m s/rad
 NECK_DOWN = {"neck_pitch": -0.60}  # rad, looks at the table in front of the robot
 FOREARM = {"radius": 0.033, "length": 0.10}  # m, a capsule along z of its link
 FOREARM_AT = {"l": (0.043, 0.0, 0.007), "r": (-0.043, 0.0, 0.007)}  # m, its middle
+UPPER_ARM = {"radius": 0.040, "length": 0.06}  # m
+TRUNK = {  # link: centre and size of a box in its frame, m
+    "root_link": ((0.03, 0.0, -0.06), (0.14, 0.20, 0.18)),
+    "torso_2": ((0.0, 0.045, 0.055), (0.08, 0.14, 0.09)),
+    "chest": ((0.0, 0.076, -0.06), (0.21, 0.21, 0.25)),
+}
+HEAD = ((-0.007, 0.119, -0.016), 0.085)  # m, centre and radius of a ball in the frame of the link
 _FIXED = re.compile(r"hip|knee|ankle|neck")
 _HIDDEN = re.compile(r"hip|knee|ankle|foot|sole|leg|root_link")
 _KEEP = re.compile(r"dh_frame|^imu|root_link|base_link")
@@ -206,14 +213,29 @@ def _without_fingers(robot: ET.Element, link: ET.Element, triangles: meshes.Arra
     return mesh
 
 
-def _add_forearm(link: ET.Element, side: str) -> None:
-    capsule = ET.SubElement(link, "collision", name=f"{side}_forearm")
-    ET.SubElement(capsule, "origin", xyz=hand_parts.text(FOREARM_AT[side]), rpy="0 0 0")
-    geometry = ET.SubElement(capsule, "geometry")
-    ET.SubElement(
-        geometry, f"{hand_parts.DRAKE}capsule", {key: f"{value:g}" for key, value in FOREARM.items()}
-    )
-    hand_parts.add_contact(capsule, hands.FINGER_FRICTION)
+def _add_arm(links: dict[str | None, ET.Element], side: str) -> None:
+    """Capsules along z of the forearm and of the upper arm."""
+    for name, centre, size in (
+        ("forearm", FOREARM_AT[side], FOREARM),
+        ("upper_arm", (-0.015, 0.0, 0.030), UPPER_ARM),
+    ):
+        capsule = ET.SubElement(links[f"{side}_{name}"], "collision", name=f"{side}_{name}")
+        ET.SubElement(capsule, "origin", xyz=hand_parts.text(centre), rpy="0 0 0")
+        geometry = ET.SubElement(capsule, "geometry")
+        sizes = {key: f"{value:g}" for key, value in size.items()}
+        ET.SubElement(geometry, f"{hand_parts.DRAKE}capsule", sizes)
+        hand_parts.add_contact(capsule, hands.FINGER_FRICTION)
+
+
+def _add_trunk(links: dict[str | None, ET.Element]) -> None:
+    """Boxes and a ball for what the arms must not reach through."""
+    for name, (centre, size) in TRUNK.items():
+        box = hand_parts.add_box(links[name], "collision", name, centre, size)
+        hand_parts.add_contact(box, hands.FINGER_FRICTION)
+    ball = ET.SubElement(links["head"], "collision", name="head")
+    ET.SubElement(ball, "origin", xyz=hand_parts.text(HEAD[0]), rpy="0 0 0")
+    ET.SubElement(ET.SubElement(ball, "geometry"), "sphere", radius=f"{HEAD[1]:g}")
+    hand_parts.add_contact(ball, hands.FINGER_FRICTION)
 
 
 def convert(folder: Path) -> Path:
@@ -226,8 +248,9 @@ def convert(folder: Path) -> Path:
     _convert_meshes(robot, source, folder)
     _motorise(robot)
     links = {link.get("name"): link for link in robot.findall("link")}
+    _add_trunk(links)
     for side in sorted(hands.PALM_SIGN):
-        _add_forearm(links[f"{side}_forearm"], side)
+        _add_arm(links, side)
         hand_parts.add_palm(links[f"{side}_hand_dh_frame"], side)
         hand_parts.add_fingers(robot, side)
         hand_parts.add_gripper(robot, side)

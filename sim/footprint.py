@@ -7,6 +7,7 @@ from pydrake.math import RigidTransform
 from cognitive_arch import footprint as flat
 from cognitive_arch.footprint import Capsule, Point, disc, gap, outer_radius, smallest_gap, tool_footprint
 from cognitive_arch.shapes import Shape
+from sim.scenario import TABLE_CENTRE_X, TABLE_SIZE
 
 __all__ = ["Capsule", "Point", "disc", "footprint", "gap", "outer_radius", "smallest_gap", "tool_footprint"]
 
@@ -15,3 +16,12 @@ def footprint(shape: Shape, X_WO: RigidTransform) -> tuple[Capsule, ...]:
     """What an object that lies flat at `X_WO` covers."""
     x, y, _ = X_WO.translation()
     return flat.footprint(shape, (float(x), float(y)), float(X_WO.rotation().ToRollPitchYaw().yaw_angle()))
+
+
+def on_table(capsule: Capsule, rim: float = 0.0) -> bool:
+    """Whether all of it is on the table, at least `rim` metres from the edge."""
+    inside = capsule.radius + rim
+    return all(
+        abs(x - TABLE_CENTRE_X) <= TABLE_SIZE[0] / 2 - inside and abs(y) <= TABLE_SIZE[1] / 2 - inside
+        for x, y in (capsule.a, capsule.b)
+    )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,19 +14,20 @@ from pydrake.solvers import SnoptSolver
 
 from cognitive_arch.world.observation import HANDS
 from sim.assets import FOREARM, FOREARM_AT
-from sim.hands import FINGER_LENGTH, FINGER_OFFSET, PALM_SIGN, SIDES, is_hand_joint
+from sim.hands import FINGER_LENGTH, FINGER_OFFSET, PALM_SIGN, SIDES, STROKE, is_hand_joint
 from sim.scenario import add_robot
 from sim.world import HOME, Joints
 
 Vector = NDArray[np.float64]
 TORSO_COST, ARM_COST = 2.0, 0.3  # moving the torso moves everything, so arms go first
 POSITION_TOLERANCE = 0.001  # m
-HAND_CLEARANCE = 0.06  # m that both wrists keep above the table
-FOREARM_CLEARANCE = 0.008  # m that a forearm keeps above the table where that is asked for
+TIP_CLEARANCE = 0.02  # m that an idle hand's finger tips keep above the table
+FOREARM_CLEARANCE = FOREARM["radius"] + 0.010  # m that the axes of both forearms do
 MAX_LEAN = 0.40  # rad that the torso may lean forward; farther, and the head hangs over the table
 APPROACH = 0.09  # m above its target that a hand comes down from
 REACH_MARGIN = 0.008  # m: where a hand only just gets to, it cannot turn as an object asks for
 RESTARTS = 3
+RAISED_TILT = 0.15  # rad by which a hand may tilt on its way
 DOWN = np.array([0.0, 0.0, -1.0])
 
 
@@ -36,8 +37,7 @@ class HandTarget:
 
     The point `p_HP` of the hand frame (metres) is to be at `p_WP`, give or take `tolerance`; the hand's
     direction `axis_H` within `tilt` radians of `axis_W`; and, if given, its y axis (along which the
-    fingers close) within `yaw_tolerance` of `fingers_W`. With `forearm_clear` the elbow is not lowered onto
-    the table either: a hand that stands upright or reaches low would ask for that.
+    fingers close) within `yaw_tolerance` of `fingers_W`.
     """
 
     p_HP: Vector
@@ -48,7 +48,6 @@ class HandTarget:
     fingers_W: Vector | None = None
     yaw_tolerance: float = 0.08
     tolerance: float = POSITION_TOLERANCE
-    forearm_clear: bool = False
 
     def at(self, p_WP: Vector) -> HandTarget:
         """The same demand at another place."""
@@ -69,6 +68,11 @@ def palm_axis(hand: str) -> Vector:
 def fingertip(hand: str) -> Vector:
     """The point between the tips of the two pads when they are out, in the hand frame, metres."""
     return np.array([FINGER_OFFSET, 0.0, 0.0]) + FINGER_LENGTH * palm_axis(hand)
+
+
+def open_tips(hand: str) -> list[Vector]:
+    """The finger tips of the open hand, in the hand frame, metres."""
+    return [fingertip(hand) + np.array([0.0, sign * STROKE, 0.0]) for sign in (1, -1)]
 
 
 class Kinematics:
@@ -109,11 +113,13 @@ class Kinematics:
         *,
         idle: HandTarget | None = None,
         restarts: int = RESTARTS,
+        accept: Callable[[Joints], bool] = lambda joints: True,
     ) -> Joints | None:
-        """Joints close to `near` that meet `target`, or None. Fingers keep their position.
+        """Joints close to `near` that meet `target` and that `accept` takes, or None. Fingers keep their
+        position.
 
-        The other arm keeps its joints, or meets `idle` if that is given (it carries something, and a
-        lean of the torso must not lower it onto the table).
+        The other arm meets `idle` if that is given (it carries something, and a lean of the torso must not
+        lower it onto the table). Else it keeps its joints if that is possible.
 
         Restarts draw from a generator of their own, seeded by the attempt, so that the answer depends on
         the arguments only.
@@ -122,7 +128,7 @@ class Kinematics:
         # Fingers that press are commanded beyond their limit.
         start = np.clip(self._full(near), lower, upper)
         for attempt in range(restarts):
-            problem = self._problem(hand, target, idle, start)
+            problem = self._problem(hand, target, idle, start, still=idle is None and attempt == 0)
             guess = start
             if attempt:
                 shaken = start + np.random.default_rng(attempt).normal(0, 0.3, len(start))
@@ -130,12 +136,13 @@ class Kinematics:
             problem.get_mutable_prog().SetInitialGuess(problem.q(), guess)
             result = SnoptSolver().Solve(problem.prog())
             if result.is_success():
-                solution: Joints = result.GetSolution(problem.q())[self._index]
-                return self._with_fingers_of(near, solution)
+                solution = self._with_fingers_of(near, result.GetSolution(problem.q())[self._index])
+                if accept(solution):
+                    return solution
         return None
 
     def _problem(
-        self, hand: str, target: HandTarget, idle: HandTarget | None, start: Vector
+        self, hand: str, target: HandTarget, idle: HandTarget | None, start: Vector, *, still: bool
     ) -> InverseKinematics:
         problem = InverseKinematics(self.plant, True)
         world = self.plant.world_frame()
@@ -143,14 +150,17 @@ class Kinematics:
         self._constrain(problem, hand, target)
         if idle is not None:
             self._constrain(problem, other, idle)
-        # A torso lean lowers the idle arm: its hand and both forearms stay clear of the table.
-        low, high = np.array([-2.0, -2.0, self._table_height + HAND_CLEARANCE]), np.full(3, 2.0)
-        for link in ("l_forearm", "r_forearm", f"{SIDES[other]}_hand_dh_frame"):
-            problem.AddPositionConstraint(self.plant.GetFrameByName(link), np.zeros(3), world, low, high)
+        # A torso lean lowers the idle arm: the tips of its fingers and both forearms stay above the table.
+        low_points = [(f"{SIDES[other]}_hand_dh_frame", tip, TIP_CLEARANCE) for tip in open_tips(other)]
+        for side in SIDES.values():
+            low_points += [(f"{side}_forearm", end, FOREARM_CLEARANCE) for end in forearm_ends(side)]
+        for link, point, clearance in low_points:
+            low = np.array([-2.0, -2.0, self._table_height + clearance])
+            frame = self.plant.GetFrameByName(link)
+            problem.AddPositionConstraint(frame, point, world, low, np.full(3, 2.0))
         q, program = problem.q(), problem.get_mutable_prog()
         for name, index in zip(self._names, self._index, strict=True):
-            still = idle is None and name.startswith(f"{SIDES[other]}_")
-            if still or is_hand_joint(name):
+            if (still and name.startswith(f"{SIDES[other]}_")) or is_hand_joint(name):
                 program.AddBoundingBoxConstraint(start[index], start[index], q[index])
         weights = np.zeros((len(start), len(start)))
         for name, index in zip(self._names, self._index, strict=True):
@@ -164,11 +174,6 @@ class Kinematics:
         margin = np.full(3, target.tolerance)
         problem.AddPositionConstraint(frame, target.p_HP, world, target.p_WP - margin, target.p_WP + margin)
         problem.AddAngleBetweenVectorsConstraint(frame, target.axis_H, world, target.axis_W, 0, target.tilt)
-        if target.forearm_clear:
-            low = np.array([-2.0, -2.0, self._table_height + FOREARM["radius"] + FOREARM_CLEARANCE])
-            forearm = self.plant.GetFrameByName(f"{SIDES[hand]}_forearm")
-            for p_FE in forearm_ends(SIDES[hand]):
-                problem.AddPositionConstraint(forearm, p_FE, world, low, np.full(3, 2.0))
         if target.fingers_W is not None:
             problem.AddAngleBetweenVectorsConstraint(
                 frame, np.array([0.0, 1.0, 0.0]), world, target.fingers_W, 0, target.yaw_tolerance
@@ -198,6 +203,14 @@ class Kinematics:
             path.append(step)
             joints = step
         return path
+
+    def raised(self, hand: str, joints: Joints, height: float) -> HandTarget:
+        """The hand `height` metres above where it is at `joints`, turned about as there."""
+        X_WH = self.hand_pose(hand, joints)
+        _, y_W, z_W = X_WH.rotation().matrix().T
+        place = X_WH.translation() + np.array([0.0, 0.0, height])
+        up = np.array([0.0, 0.0, 1.0])
+        return HandTarget(np.zeros(3), place, up, z_W, RAISED_TILT, y_W, RAISED_TILT, tolerance=0.01)
 
     def reaches(self, hand: str, x: float, y: float) -> bool:
         """Whether `hand` can come down on something on the table at (x, y), metres; remembered per 5 mm."""

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cognitive_arch.domain import Domain, ReachLimits, Scene
 from cognitive_arch.world.observation import HANDS
+from sim.clearance import Clearance
 from sim.hands import SIDES, Posture, is_hand_joint
 from sim.kinematics import (
     APPROACH,
@@ -30,6 +33,7 @@ YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing di
 CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may be moved meanwhile
 TOOL_TILT, TOOL_TURN = 0.06, 0.15  # rad, the same for a hand with a tool
 POSTURE_TIME = 0.6  # s to bend the fingers
+DETOURS = (0.12, 0.06)  # m by which a hand rises to get over what is in its way
 TRANSIT_SPEED = 0.9  # rad/s of the fastest joint between poses
 
 
@@ -51,6 +55,19 @@ class Grip:
     def from_json(cls, data: Mapping[str, Any]) -> Grip:
         """The inverse of `to_json`."""
         return cls(**{**data, "yaws": tuple(data["yaws"]), "carrying": np.array(data["carrying"], float)})
+
+
+@dataclass(frozen=True)
+class Descent:
+    """The way to above a place, its last waypoint being there, and the waypoints straight down to it."""
+
+    way: list[Joints]
+    down: list[Joints]
+
+    @property
+    def back(self) -> list[Joints]:
+        """The waypoints up again."""
+        return [*self.down[-2::-1], self.way[-1]]
 
 
 def _other(hand: str) -> str:
@@ -75,6 +92,8 @@ class Robot:
 
     def __post_init__(self) -> None:
         self.kinematics = Kinematics(self.world.joint_names, self.scene.table.height)
+        self.clearance = Clearance(self.world)
+        self._hand_joints = np.array([is_hand_joint(name) for name in self.world.joint_names])
         self.perception = OraclePerception(self.world, self.kinematics, self.reach)
 
     def save(self) -> dict[str, Any]:
@@ -103,27 +122,86 @@ class Robot:
         """Height of an object's upper face, metres."""
         return float(self.world.pose(name).translation()[2] + self.world.height(name) / 2)
 
-    def travel(self, joints: Joints) -> None:
-        """Go to `joints` as fast as the fastest joint may (minimum jerk peaks at 1.9 times its mean)."""
-        farthest = float(np.abs(joints - self.world.command).max())
-        self.world.follow([joints], max(0.6, 1.9 * farthest / TRANSIT_SPEED))
+    def look(self, supposed: Mapping[str, tuple[str, RigidTransform]] | None = None) -> None:
+        """Take in what is in the way now, before a motion is planned.
+
+        `supposed` says of a hand what it holds and its pose in the hand frame, other than it is.
+        """
+        held = {}
+        for hand in HANDS:
+            name = self.perception.held(hand)
+            if name is not None:
+                held[hand] = (name, self.world.hand_pose(hand).inverse() @ self.world.pose(name))
+        self.clearance.look(held | dict(supposed or {}))
+
+    def way(self, hand: str, joints: Joints) -> list[Joints] | None:
+        """Waypoints of a collision-free way of `hand` to `joints`, or None; as seen by the last `look`.
+
+        If the straight way is not free, the hand first goes up, or by its home posture, or comes from above.
+        """
+        here = self.world.command
+        here = np.where(self._hand_joints, joints, here)
+        with self.clearance.leaving(here):
+            if self.clearance.free_path([here, joints]):
+                return [joints]
+            up = self._detour(hand, here)
+            over = self._detour(hand, joints)
+            home = [np.where(self._hand_joints, joints, self.rest(hand))]
+            for via in (up, over, [*up, *over], home, [*up, *home], [*home, *over], [*up, *home, *over]):
+                if via and self.clearance.free_path([here, *via, joints]):
+                    return [*via, joints]
+        return None
+
+    def _detour(self, hand: str, joints: Joints) -> list[Joints]:
+        """The hand raised from where it is at `joints`: one waypoint, or none if it cannot be."""
+        for height in DETOURS:
+            target = self.kinematics.raised(hand, joints, height)
+            found = self.kinematics.solve(
+                hand, target, joints, idle=self.idle_target(hand), accept=self.clearance.free
+            )
+            if found is not None:
+                return [found]
+        return []
+
+    def go(self, waypoints: Sequence[Joints]) -> None:
+        """Through waypoints as fast as the fastest joint may (minimum jerk peaks at 1.9 times its mean)."""
+        path = [self.world.command, *waypoints]
+        length = sum(float(np.abs(b - a).max()) for a, b in itertools.pairwise(path))
+        self.world.follow(waypoints, max(0.6, 1.9 * length / TRANSIT_SPEED))
+
+    def travel(self, hand: str, joints: Joints) -> None:
+        """Go to `joints` with `hand` round what is in the way, or straight if there is no way round."""
+        self.look()
+        self.go(self.way(hand, joints) or [joints])
 
     def above(self, target: HandTarget) -> HandTarget:
         """The place from which a hand comes down to `target`."""
         return target.at(target.p_WP + np.array([0.0, 0.0, APPROACH]))
 
-    def descent(self, hand: str, target: HandTarget) -> tuple[Joints, list[Joints]] | None:
-        """Joints above `target` and the waypoints straight down to it, or None if out of reach."""
+    def descent(
+        self, hand: str, target: HandTarget, touched: Collection[str], opening: float | None = None
+    ) -> Descent | None:
+        """A collision-free way down to `target`, where the hand, or what it holds, may touch some objects;
+        None if there is none. `opening` is that of the fingers, metres."""
         high, idle = self.above(target), self.idle_target(hand)
-        start = self.kinematics.solve(hand, high, self.rest(hand), idle=idle)
+        near = self.rest(hand)
+        if opening is not None:
+            near = self.world.with_fingers(near, hand, opening)
+        start = self.kinematics.solve(hand, high, near, idle=idle, accept=self.clearance.free)
         if start is None:
             return None
-        path = self.kinematics.line(hand, high, target.p_WP, start, idle=idle)
-        return None if path is None else (start, path)
+        down = self.kinematics.line(hand, high, target.p_WP, start, idle=idle)
+        if down is None:
+            return None
+        with self.clearance.touching(hand, touched):
+            if not self.clearance.free_path([start, *down]):
+                return None
+        way = self.way(hand, start)
+        return None if way is None else Descent(way, down)
 
     def rest(self, hand: str) -> Joints:
-        """The home posture for torso and `hand`; the other arm, and with it the torso, home or carrying;
-        fingers as commanded, the pads of an empty hand drawn in.
+        """The home posture; if the other arm carries something, it does so, and the torso with it; fingers as
+        commanded, the pads of an empty hand drawn in.
 
         Inverse kinematics starts from here, so that postures do not wander off over many actions.
         """
@@ -132,7 +210,7 @@ class Robot:
         if hand not in self.grips:
             command = self.world.with_pads_in(command, hand)
         if other not in self.grips:
-            return np.where(self._arm_joints(hand, "torso"), self.world.home, command)
+            return np.where(self._hand_joints, command, self.world.home)
         # The torso goes back to where the other arm's posture was solved for: with any other lean the
         # same arm joints may lower a tool onto the table.
         joints = np.where(self._arm_joints(hand), self.world.home, command)
@@ -162,7 +240,7 @@ class Robot:
 
     def go_home(self, hand: str) -> None:
         """Back to the home posture with one arm; an empty hand draws its pads in."""
-        self.travel(self.rest(hand))
+        self.travel(hand, self.rest(hand))
 
     def grasp_targets(self, hand: str, p_WP: Vector, yaws: tuple[float, ...]) -> list[HandTarget]:
         """Ways to bring the finger tips of `hand` to `p_WP`, palm down, the most upright ones first."""

@@ -85,15 +85,26 @@ def build_scenario(domain: Domain, scene: Scene, *, friction: float = FRICTION) 
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, TIME_STEP)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     plant.set_contact_model(ContactModel.kPoint)
-    robot = add_robot(plant)
-    table = _add_table(plant, scene.table.height, friction)
-    objects = {name: _add_object(plant, name, domain.objects[name], friction) for name in scene.things}
+    robot, table, objects = populate(plant, domain, scene, friction)
     _set_gains(plant)
     # The real arms compensate gravity in their controllers; the objects they carry still weigh.
     plant.set_gravity_enabled(robot, False)
     plant.Finalize()
     _let_robot_overlap_itself(plant, scene_graph, robot)
     return Scenario(builder, plant, scene_graph, robot, table, objects)
+
+
+def populate(
+    plant: MultibodyPlant, domain: Domain, scene: Scene, friction: float = FRICTION
+) -> tuple[ModelInstanceIndex, RigidBody, dict[str, RigidBody]]:
+    """Add robot, table and the scene's objects, always in the same order; returns them."""
+    robot = add_robot(plant)
+    table = _add_table(plant, scene.table.height, friction)
+    return (
+        robot,
+        table,
+        {name: _add_object(plant, name, domain.objects[name], friction) for name in scene.things},
+    )
 
 
 def add_robot(plant: MultibodyPlant) -> ModelInstanceIndex:

@@ -147,6 +147,16 @@ class World:
         positions: NDArray[np.float64] = self.plant.GetPositions(self._plant_context)
         return positions
 
+    def configuration(self, joints: Joints) -> Joints:
+        """All positions of the plant as they are now, (n_positions,), the robot's joints at `joints`."""
+        return self.with_joints(self.plant.GetPositions(self._plant_context), joints)
+
+    def with_joints(self, configuration: Joints, joints: Joints) -> Joints:
+        """A configuration with the robot's joints at `joints`."""
+        changed = configuration.copy()
+        changed[self._positions] = joints
+        return changed
+
     def contacts(self) -> frozenset[tuple[str, str]]:
         """Names of the bodies that press on each other now, each pair in both orders.
 

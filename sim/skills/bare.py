@@ -15,12 +15,10 @@ from pydrake.math import RigidTransform
 
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
-from sim.assets import FOREARM
-from sim.footprint import Capsule, Point, footprint, smallest_gap
+from sim.footprint import Capsule, Point, footprint, on_table, smallest_gap
 from sim.hands import BENDS, PALM_SIGN, SIDES, Posture, limbs
-from sim.kinematics import HandTarget, Vector, forearm_ends, palm_axis
+from sim.kinematics import HandTarget, Vector, palm_axis
 from sim.robot import Robot
-from sim.scenario import TABLE_CENTRE_X, TABLE_SIZE
 from sim.skills.tool import obstacles
 from sim.world import Joints
 
@@ -83,7 +81,6 @@ class Stance:
             TILT,
             fingers_W=self.y_W,
             yaw_tolerance=TILT,
-            forearm_clear=True,
         )
 
     def front(self, course: Point, below: float) -> tuple[float, float]:
@@ -176,9 +173,9 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Motion:
-    """Joints above the start and waypoints down, along, and away again."""
+    """The way to above the start and waypoints down, along, and away again."""
 
-    above: Joints
+    way: list[Joints]
     down: list[Joints]
     along: list[Joints]
     away: list[Joints]
@@ -217,6 +214,7 @@ def _plan(
 ) -> tuple[Motion | None, FailureReason]:
     aim = robot.noise.aim(hand, "grasp")
     others = obstacles(robot, obj)
+    robot.look()
     free: list[Sweep] = []
     reasons = []
     for sweep in _sweeps(robot, obj, hand, towards, stances, aim):
@@ -227,7 +225,7 @@ def _plan(
             reasons.append(reason)
     # A hand whose tips must stay high to come down behind the object hardly gets hold of it.
     for sweep in sorted(free, key=lambda sweep: sweep.height)[:_TRIES]:
-        motion = _solve(robot, sweep, others)
+        motion = _solve(robot, obj, sweep)
         if motion is not None:
             return motion, FailureReason.NONE
     if free:
@@ -293,7 +291,7 @@ def _in_the_way(
     """What speaks against a sweep: the object would fall, or hand or object would hit something."""
     body = footprint(robot.domain.objects[obj].shape, robot.world.pose(obj))
     low = [capsule for capsules in others.values() for capsule in capsules]
-    if not all(_on_table(part.moved(*sweep.shift)) for part in body):
+    if not all(on_table(part.moved(*sweep.shift), RIM) for part in body):
         return FailureReason.OFF_TABLE
     for place, t in sweep.places():
         moved = [part.moved(sweep.shift[0] * t, sweep.shift[1] * t) for part in body]
@@ -302,14 +300,6 @@ def _in_the_way(
         ):
             return FailureReason.BLOCKED
     return None
-
-
-def _on_table(part: Capsule) -> bool:
-    inside = part.radius + RIM
-    return all(
-        abs(p[0] - TABLE_CENTRE_X) <= TABLE_SIZE[0] / 2 - inside and abs(p[1]) <= TABLE_SIZE[1] / 2 - inside
-        for p in (part.a, part.b)
-    )
 
 
 def clear(
@@ -324,18 +314,7 @@ def clear(
     return True
 
 
-def forearm_is_clear(robot: Robot, hand: str, joints: Joints, others: dict[str, tuple[Capsule, ...]]) -> bool:
-    """Whether the forearm touches neither the table nor anything on it at `joints`."""
-    side = SIDES[hand]
-    X_WF = robot.kinematics.link_pose(f"{side}_forearm", joints)
-    a, b = (X_WF @ end for end in forearm_ends(side))
-    radius = FOREARM["radius"]
-    underside = float(min(a[2], b[2])) - radius - robot.scene.table.height
-    arm = Capsule((float(a[0]), float(a[1])), (float(b[0]), float(b[1])), radius)
-    return underside > OVER and clear(robot, [(arm, underside)], others)
-
-
-def _solve(robot: Robot, sweep: Sweep, others: dict[str, tuple[Capsule, ...]]) -> Motion | None:
+def _solve(robot: Robot, obj: str, sweep: Sweep) -> Motion | None:
     hand, kinematics = sweep.stance.hand, robot.kinematics
     idle, rest = robot.idle_target(hand), robot.rest(hand)
     low = robot.scene.table.height + sweep.stance.radius + sweep.height
@@ -345,10 +324,9 @@ def _solve(robot: Robot, sweep: Sweep, others: dict[str, tuple[Capsule, ...]]) -
 
     # Both ends are asked for first to give up early: sweeps that fail, fail there.
     for place in (sweep.end, sweep.start):
-        joints = kinematics.solve(hand, at(place), rest, idle=idle, restarts=1)
-        if joints is None or not forearm_is_clear(robot, hand, joints, others):
+        if kinematics.solve(hand, at(place), rest, idle=idle, restarts=1) is None:
             return None
-    above = kinematics.solve(hand, at(sweep.start, LIFT), rest, idle=idle)
+    above = kinematics.solve(hand, at(sweep.start, LIFT), rest, idle=idle, accept=robot.clearance.free)
     if above is None:
         return None
     length = math.dist(sweep.start, sweep.end)
@@ -372,9 +350,12 @@ def _solve(robot: Robot, sweep: Sweep, others: dict[str, tuple[Capsule, ...]]) -
         legs.append(leg)
         joints = leg[-1]
     down, along, back_off, up = legs
-    if not all(forearm_is_clear(robot, hand, q, others) for q in along):
-        return None
-    return Motion(above, down, along, [*back_off, *up], max(0.5, length / SPEED))
+    away = [*back_off, *up]
+    with robot.clearance.touching(hand, [obj]):
+        if not robot.clearance.free_path([above, *down, *along, *away]):
+            return None
+    way = robot.way(hand, above)
+    return None if way is None else Motion(way, down, along, away, max(0.5, length / SPEED))
 
 
 def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
@@ -386,7 +367,7 @@ def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
         touched = touched or world.hand_touches(hand, obj)
         return False
 
-    robot.travel(motion.above)
+    robot.go(motion.way)
     world.follow(motion.down, 0.8, watch)
     world.follow(motion.along, motion.seconds, watch)
     world.follow(motion.away, 1.0, watch)

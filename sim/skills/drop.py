@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator
 
 import numpy as np
 
 from cognitive_arch.execution.environment import FailureReason
 from sim.footprint import disc, footprint, outer_radius, smallest_gap
+from sim.kinematics import HandTarget
 from sim.robot import Robot
-from sim.skills.put import set_down
+from sim.skills.put import level_targets, set_down
+from sim.skills.tool import held_tool, lay_targets
 
 ROOM = 0.025  # m around what is put down: fingers open there
-TOOL_RADIUS = 0.03  # m about the middle of a shaft
 FREE = 0.080  # m of room; more makes a place no better
 PLACES = (np.arange(-0.24, -0.47, -0.04), np.arange(0.08, 0.30, 0.04))  # m, x and |y| to choose from
 
@@ -22,15 +24,20 @@ def drop(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     name, hand = args
     if robot.perception.held(hand) != name:
         return FailureReason.HAND_EMPTY
+    reason = set_down(robot, hand, _targets(robot, name, hand))
+    if reason is FailureReason.NONE and ("table", name) not in robot.world.contacts():
+        return FailureReason.MISPLACED
+    return reason
+
+
+def _targets(robot: Robot, name: str, hand: str) -> Iterator[HandTarget]:
+    tool = held_tool(robot, name, hand)
+    if tool is not None:
+        yield from lay_targets(robot, tool)
+        return
     height = robot.scene.table.height + robot.world.height(name) / 2
     for x, y in free_places(robot, name, hand):
-        reason = set_down(robot, hand, np.array([x, y, height]))
-        if reason is FailureReason.OUT_OF_REACH:
-            continue
-        if reason is FailureReason.NONE and ("table", name) not in robot.world.contacts():
-            return FailureReason.MISPLACED
-        return reason
-    return FailureReason.OUT_OF_REACH
+        yield from level_targets(robot, hand, np.array([x, y, height]))
 
 
 def free_places(robot: Robot, name: str, hand: str) -> list[tuple[float, float]]:
@@ -44,8 +51,7 @@ def free_places(robot: Robot, name: str, hand: str) -> list[tuple[float, float]]
         for capsule in footprint(shapes[other].shape, world.pose(other))
     ]
     shape = shapes[name].shape
-    # A tool reaches far, but where to depends on how it is held.
-    own = TOOL_RADIUS if shape.type == "tool" else outer_radius(shape)
+    own = outer_radius(shape)
     places = []
     for x, y in itertools.product(*PLACES):
         place = (float(x), sign * float(y))

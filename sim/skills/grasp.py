@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Sequence
 
 import numpy as np
 
@@ -11,7 +12,7 @@ from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
 from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, HANDLE, STROKE, Posture
 from sim.kinematics import DOWN, HandTarget, Vector, palm_axis
-from sim.robot import YAWS, Grip, Robot
+from sim.robot import YAWS, Descent, Grip, Robot
 from sim.skills.base import release
 from sim.skills.tool import carry_tool
 from sim.world import Joints
@@ -28,7 +29,12 @@ CARRY_HEIGHT = 0.17  # m above the table
 def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
     name, hand = args
-    reason, _ = pick_up(robot, name, hand)
+    return take(robot, name, hand)
+
+
+def take(robot: Robot, name: str, hand: str, insets: Sequence[float] = HANDLE) -> FailureReason:
+    """Take an object and carry it aside; a tool at one of `insets` (m from the end of its handle)."""
+    reason, _ = pick_up(robot, name, hand, insets)
     if reason is not FailureReason.NONE:
         return reason
     if robot.domain.objects[name].shape.type == "tool":
@@ -38,7 +44,9 @@ def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     return FailureReason.NONE if robot.perception.held(hand) == name else FailureReason.SLIPPED
 
 
-def pick_up(robot: Robot, name: str, hand: str) -> tuple[FailureReason, list[Joints]]:
+def pick_up(
+    robot: Robot, name: str, hand: str, insets: Sequence[float] = HANDLE
+) -> tuple[FailureReason, list[Joints]]:
     """Take an object and raise it; returns why not, or `NONE`, and the waypoints from it upwards."""
     obstacle = _obstacle(robot, name, hand)
     if obstacle is not None:
@@ -51,24 +59,23 @@ def pick_up(robot: Robot, name: str, hand: str) -> tuple[FailureReason, list[Joi
     closed = width / 2 - squeeze if is_tool else max(0.0, width / 2 - squeeze)
     robot.set_posture(hand, Posture.STRAIGHT)
     grip = Grip(min(STROKE, width / 2 + MARGIN), closed, yaws, robot.world.home)
-    plan = _plan(robot, name, hand, grip, aim)
+    robot.look()
+    plan = _plan(robot, name, hand, grip, aim, insets)
     if plan is None:
         return FailureReason.OUT_OF_REACH, []
-    start, down = plan
     world = robot.world
-    robot.travel(world.with_fingers(start, hand, grip.opening))
-    world.follow([world.with_fingers(q, hand, grip.opening) for q in down], 1.0)
+    robot.go(plan.way)
+    world.follow(plan.down, 1.0)
     world.move_fingers(hand, grip.closed, 0.5)
     world.hold(0.15)
-    way_up = [*down[::-1], start]
-    world.follow([world.with_fingers(q, hand, grip.closed) for q in way_up[1:]], 1.0)
+    world.follow([world.with_fingers(q, hand, grip.closed) for q in plan.back], 1.0)
     world.hold(0.1)
     if robot.perception.held(hand) != name:
         release(robot, hand, STROKE)
         robot.go_home(hand)
         return FailureReason.NOT_GRASPED, []
     robot.grips[hand] = grip
-    return FailureReason.NONE, way_up
+    return FailureReason.NONE, [plan.down[-1], *plan.back]
 
 
 def _obstacle(robot: Robot, name: str, hand: str) -> FailureReason | None:
@@ -99,20 +106,24 @@ def _wrap(angle: float) -> float:
     return (angle + math.pi / 2) % math.pi - math.pi / 2
 
 
-def _plan(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> tuple[Joints, list[Joints]] | None:
-    targets = _targets(robot, name, hand, grip, aim)
+def _plan(
+    robot: Robot, name: str, hand: str, grip: Grip, aim: Vector, insets: Sequence[float]
+) -> Descent | None:
+    targets = _targets(robot, name, hand, grip, aim, insets)
     # Sorting is stable: among equally free directions the more upright and straighter ones stay first.
     targets.sort(key=lambda target: -min(0.0, _clearance(robot, name, target, grip)))
     for target in targets:
         if _clearance(robot, name, target, grip) < -0.01:
             continue
-        found = robot.descent(hand, target)
+        found = robot.descent(hand, target, [name], grip.opening)
         if found is not None:
             return found
     return None
 
 
-def _targets(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> list[HandTarget]:
+def _targets(
+    robot: Robot, name: str, hand: str, grip: Grip, aim: Vector, insets: Sequence[float]
+) -> list[HandTarget]:
     """Where the finger tips could go: around an object's middle, or on a tool's handle."""
     shape, X_WO = robot.domain.objects[name].shape, robot.world.pose(name)
     height = robot.world.height(name)
@@ -121,7 +132,7 @@ def _targets(robot: Robot, name: str, hand: str, grip: Grip, aim: Vector) -> lis
         return robot.grasp_targets(hand, X_WO.translation() + aim + up, grip.yaws)
     targets = []
     ends = (1.0,) if shape.bar > 0 else (1.0, -1.0)
-    for inset, end in itertools.product(HANDLE, ends):
+    for inset, end in itertools.product(insets, ends):
         handle = X_WO @ np.array([end * (shape.length / 2 - inset), 0.0, 0.0])
         along = end * X_WO.rotation().matrix()[:, 0]
         # The stretched fingers point to the tool's head: held the other way round it is of no use.
@@ -154,9 +165,12 @@ def carry(robot: Robot, hand: str) -> None:
     """Move what the hand holds to where a full hand waits, level, out of the other hand's way."""
     height = robot.scene.table.height + CARRY_HEIGHT
     target = object_target(robot, hand, np.array([*CARRY[hand], height]), None)
-    joints = robot.kinematics.solve(hand, target, robot.rest(hand), idle=robot.idle_target(hand))
+    robot.look()
+    joints = robot.kinematics.solve(
+        hand, target, robot.rest(hand), idle=robot.idle_target(hand), accept=robot.clearance.free
+    )
     if joints is not None:
-        robot.travel(joints)
+        robot.travel(hand, joints)
     robot.grips[hand].carrying = robot.world.command
 
 

@@ -11,31 +11,28 @@ import numpy as np
 
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
-from sim.footprint import Capsule, Point, disc, footprint, smallest_gap
+from sim.footprint import Capsule, Point, disc, outer_radius, smallest_gap
 from sim.robot import Robot
+from sim.skills.regrip import sweep_with_tool
 from sim.skills.tool import (
     PITCHES,
     HeldTool,
     Sweep,
     discomfort,
-    first_feasible,
     held_tool,
     is_free,
     obstacles,
-    perform,
-    spread_idle_arm,
     unusable,
 )
 
 BEHIND = 0.015  # m between the bar and the object when the tool comes down
 BESIDE = 0.005  # m between the shaft and the object
-CLOSER = 0.115  # m that a pull is to bring an object closer, at least
 ROOM = 0.030  # m around the object where it ends up: fingers must fit in
-ENDS = (  # m, x and y to choose from
-    tuple(round(float(x), 2) for x in np.arange(-0.30, -0.46, -0.02)),
-    tuple(round(float(y), 2) for y in np.arange(-0.21, 0.22, 0.03)),
-)
-SKEWS = (0.0, 0.3, -0.3, 0.55, -0.55)  # rad; friction holds the object on the bar up to about 0.67
+CLOSER = (0.107, 0.12, 0.14, 0.17, 0.20, 0.24)  # m that a pull may bring an object closer
+SIDEWAYS = tuple(round(float(y), 2) for y in np.arange(-0.21, 0.22, 0.03))  # m, y where it may end up
+NEAREST_END = -0.30  # m, x
+SKEWS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.9, -0.9)  # rad
+HOLDS = 0.65  # rad up to which friction keeps the object on the bar; beyond, it slides along to the shaft
 BEST_X = -0.40  # m
 
 
@@ -48,36 +45,42 @@ def pull(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     tool = held_tool(robot, name, hand)
     if tool is None or tool.shape.bar <= 0:
         return FailureReason.CANNOT_PULL
-    tool = tool.with_head_off(robot.noise.head("pull"))
-    spread_idle_arm(robot, hand)
-    motion = first_feasible(robot, tool, _sweeps(robot, tool, obj))
-    return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
+    return sweep_with_tool(robot, tool, obj, robot.noise.head("pull"), _sweeps)
 
 
 def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
     """Ways to drag the object to where the other hand can take it, the best first."""
     x, y, _ = robot.world.pose(obj).translation()
     place = (float(x), float(y))
-    (body,) = footprint(robot.domain.objects[obj].shape, robot.world.pose(obj))
+    radius = outer_radius(robot.domain.objects[obj].shape)
     others = obstacles(robot, obj)
     low = [c for capsules in others.values() for c in capsules]
     ranked = []
-    for end, skew, side in itertools.product(itertools.product(*ENDS), SKEWS, (1.0, -1.0)):
+    for closer, y, skew, side in itertools.product(CLOSER, SIDEWAYS, SKEWS, (1.0, -1.0)):
+        end = (place[0] + closer, y)
         course = math.atan2(end[1] - place[1], end[0] - place[0])
         # Pulled askew the object slides along the bar: it must slide towards the shaft.
-        if end[0] - place[0] < CLOSER or abs(course) > 0.9 or skew * side > 0:
+        if end[0] > NEAREST_END or abs(course) > 0.9 or skew * side > 0:
             continue
-        room = smallest_gap([disc(end, body.radius)], low)
-        if room < ROOM or smallest_gap([Capsule(place, end, body.radius)], low) < 0.005:
+        room = smallest_gap([disc(end, radius)], low)
+        if room < ROOM or smallest_gap([Capsule(place, end, radius)], low) < 0.005:
             continue
-        sweep = _sweep(tool, place, end, body.radius, side, skew)
-        cost = discomfort(tool, sweep) + 2 * abs(end[0] - BEST_X) + abs(end[1]) + 10 * max(0.0, 0.06 - room)
-        ranked.append((cost, end, sweep))
+        sweep = _sweep(tool, place, end, radius, side, skew)
+        cost = (
+            discomfort(tool, sweep)
+            + 2 * abs(end[0] - BEST_X)
+            + abs(end[1])
+            + 10 * max(0.0, 0.06 - room)
+            + 0.1 * abs(skew)
+        )
+        ranked.append((cost, end, skew, sweep))
     other = next(hand for hand in HANDS if hand != tool.hand)
-    for _, end, flat in sorted(ranked, key=lambda row: row[0]):
+    for _, end, skew, flat in sorted(ranked, key=lambda row: row[0]):
         if not robot.kinematics.reaches(other, *end):
             continue
-        for pitch in PITCHES:
+        # Under a raised shaft the object would slip through.
+        pitches = PITCHES if abs(skew) <= HOLDS else PITCHES[:1]
+        for pitch in pitches:
             sweep = replace(flat, pitch=pitch)
             if is_free(robot, tool, sweep, others):
                 yield sweep

@@ -9,20 +9,17 @@ from dataclasses import replace
 
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
-from sim.footprint import Capsule, Point, disc, footprint, smallest_gap
+from sim.footprint import Capsule, Point, disc, on_table, outer_radius, smallest_gap
 from sim.robot import Robot
-from sim.scenario import TABLE_CENTRE_X, TABLE_SIZE
+from sim.skills.regrip import sweep_with_tool
 from sim.skills.tool import (
     PITCHES,
     HeldTool,
     Sweep,
     discomfort,
-    first_feasible,
     held_tool,
     is_free,
     obstacles,
-    perform,
-    spread_idle_arm,
     unusable,
 )
 
@@ -43,30 +40,27 @@ def push(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     tool = held_tool(robot, name, hand)
     if tool is None:
         return FailureReason.NOT_A_TOOL
-    tool = tool.with_head_off(robot.noise.head("push"))
-    spread_idle_arm(robot, hand)
-    motion = first_feasible(robot, tool, _sweeps(robot, tool, obj))
-    return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
+    return sweep_with_tool(robot, tool, obj, robot.noise.head("push"), _sweeps)
 
 
 def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
     """Ways to push the object out of reach, or at least farther away, the best first."""
     x, y, _ = robot.world.pose(obj).translation()
     place = (float(x), float(y))
-    (body,) = footprint(robot.domain.objects[obj].shape, robot.world.pose(obj))
+    radius = outer_radius(robot.domain.objects[obj].shape)
     others = obstacles(robot, obj)
     low = [c for capsules in others.values() for c in capsules]
     skews = SKEWS if tool.shape.bar > 0 else (0.0,)
     ranked = []
     for distance, course, skew in itertools.product(DISTANCES, COURSES, skews):
         end = (place[0] - distance * math.cos(course), place[1] - distance * math.sin(course))
-        path = Capsule(place, end, body.radius)
-        if not _on_table(end, body.radius) or smallest_gap([path], low) < 0.005:
+        path = Capsule(place, end, radius)
+        if not on_table(disc(end, radius), RIM) or smallest_gap([path], low) < 0.005:
             continue
-        if smallest_gap([disc(end, body.radius)], low) < ROOM:
+        if smallest_gap([disc(end, radius)], low) < ROOM:
             continue
         near = any(robot.kinematics.reaches(hand, *end) for hand in HANDS)
-        sweep = _sweep(tool, place, end, body.radius, skew)
+        sweep = _sweep(tool, place, end, radius, skew)
         cost = discomfort(tool, sweep) + abs(course) + abs(skew) + distance + (1.0 if near else 0.0)
         ranked.append((cost, sweep))
     for _, flat in sorted(ranked, key=lambda row: row[0]):
@@ -74,14 +68,6 @@ def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
             sweep = replace(flat, pitch=pitch)
             if is_free(robot, tool, sweep, others):
                 yield sweep
-
-
-def _on_table(place: Point, radius: float) -> bool:
-    inside = radius + RIM
-    return (
-        abs(place[0] - TABLE_CENTRE_X) <= TABLE_SIZE[0] / 2 - inside
-        and abs(place[1]) <= TABLE_SIZE[1] / 2 - inside
-    )
 
 
 def _sweep(tool: HeldTool, place: Point, end: Point, radius: float, skew: float) -> Sweep:

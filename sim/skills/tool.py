@@ -13,26 +13,24 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.shapes import ToolShape
 from cognitive_arch.world.observation import HANDS
-from sim.footprint import Capsule, Point, disc, footprint, smallest_gap
-from sim.hands import FINGER_WIDTH, SIDES, STROKE
+from sim.footprint import Capsule, Point, disc, footprint, on_table, smallest_gap, tool_footprint
+from sim.hands import FINGER_WIDTH, STROKE
 from sim.kinematics import HandTarget, Vector
 from sim.robot import Robot
 from sim.skills.base import release
 from sim.world import Joints
 
-FLOAT = 0.002  # m between a sweeping tool and the table
+FLOAT = 0.003  # m between a sweeping tool and the table
 LIFT = 0.075  # m above that at which a tool travels: over everything but a tall stack
 END_LIFT = 0.045  # m that it is lifted at first where a sweep ends, near the body: over what was pulled
 SPEED = 0.10  # m/s of a sweep
 MARGIN = 0.008  # m that a sweep keeps from what it is not to touch
 OVER = 0.008  # m that a raised shaft passes over it
-LEVEL = 0.03  # rad; at the far end of a shaft this is 6 mm
+LEVEL = 0.012  # rad; at the far end of a shaft this is 4 mm
 YAW_TOLERANCE = 0.03  # rad
-PITCHES = (0.0, 0.08, 0.15)  # rad by which the handle may be higher than the head
-NEAREST = (-0.20, 0.08)  # m, x and |y|: nearer to its own body a hand hardly gets, nor to the other side
-FARTHEST = -0.46  # m: farther away it gets only straight ahead
+PITCHES = (0.0, 0.15, 0.22)  # rad by which the handle may be higher than the head
+NEAREST, NEAR, FARTHEST = -0.15, -0.24, -0.47  # m, x of a hand that holds a tool level
 PALM_HEIGHT = 0.045  # m above the table: what is taller must not be under the palm
-IDLE_ROLL = 1.3  # rad of an idle arm's shoulder while the other one sweeps a tool
 _SHAFT_PARTS = 6
 _PIECE = 0.03  # m between two waypoints, or two looks at what is in the way
 
@@ -56,6 +54,15 @@ class HeldTool:
         """From the middle of the head to the fingers along the shaft, metres."""
         fingers = self.X_HT.inverse() @ np.array([0.02, 0.0, 0.0])
         return float(fingers[0] - self.p_TH[0])
+
+    def held_nearer(self, by: float) -> HeldTool:
+        """The same, held `by` metres nearer to its head."""
+        return replace(self, X_HT=self.X_HT @ RigidTransform([by, 0.0, 0.0]))
+
+    def held_at(self, inset: float) -> HeldTool:
+        """The same, held `inset` metres from the end of its handle."""
+        by = self.shape.length - self.shape.width / 2 - inset - self.grip
+        return replace(self, X_HT=self.X_HT @ RigidTransform([-by, 0.0, 0.0]))
 
     def target(self, head: Vector, yaw: float, pitch: float = 0.0) -> HandTarget:
         """The hand pose that brings the head to `head` (metres), the shaft at `yaw` and `pitch`."""
@@ -129,9 +136,9 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Motion:
-    """Joints above the start of a sweep and the waypoints down, along and up again."""
+    """The way to above the start of a sweep and the waypoints down, along and up again."""
 
-    above: Joints
+    way: list[Joints]
     down: list[Joints]
     along: list[Joints]
     up: list[Joints]
@@ -173,14 +180,22 @@ def obstacles(robot: Robot, *but: str) -> dict[str, tuple[Capsule, ...]]:
 
 
 def discomfort(tool: HeldTool, sweep: Sweep) -> float:
-    """How much the arm has to twist: metres by which the hand ends up too near the body or the other
-    side, weighed with radians by which the shaft points outwards."""
-    sign = -1.0 if tool.hand == "LeftHand" else 1.0
-    cost = 0.5 * abs(sign * sweep.yaw - 0.3)
+    """How far (in 10 cm) the hand leaves the part of the table where it can hold the shaft level at that
+    yaw, and how much (in 5 rad) the shaft leaves the most natural direction.
+
+    Inverse kinematics decides; this only says what to ask it first. The limits are read off a map of what
+    the left hand reaches; the right one is its mirror image.
+    """
+    side = 1.0 if tool.hand == "LeftHand" else -1.0
+    yaw = side * sweep.yaw
+    cost = 0.2 * abs(yaw + 0.3)
     for head in (sweep.start, sweep.end):
         x = head[0] + tool.grip * math.cos(sweep.yaw)
-        y = sign * (head[1] + tool.grip * math.sin(sweep.yaw))
-        cost += 10 * (max(0.0, x - NEAREST[0]) + max(0.0, NEAREST[1] - y) + max(0.0, FARTHEST - x))
+        y = side * (head[1] + tool.grip * math.sin(sweep.yaw))
+        far = 0.4 * max(0.0, NEAR - x)
+        low = -0.36 - 0.15 * min(0.0, yaw) + far
+        high = -0.03 - 0.17 * yaw + far
+        cost += 10 * (max(0.0, low - y) + max(0.0, y - high) + max(0.0, FARTHEST - x) + max(0.0, x - NEAREST))
     return cost
 
 
@@ -202,27 +217,20 @@ def is_free(robot: Robot, tool: HeldTool, sweep: Sweep, others: dict[str, tuple[
     return True
 
 
-def spread_idle_arm(robot: Robot, hand: str) -> None:
-    """Take the other arm, if it is empty, farther out: with a turned torso its forearm comes to where a
-    raised tool passes, and knocked against it the tool turns in the hand and is lost."""
-    other = next(h for h in HANDS if h != hand)
-    if other in robot.grips:
-        return
-    joints = robot.world.command.copy()
-    joints[robot.world.joint_names.index(f"{SIDES[other]}_shoulder_roll")] = IDLE_ROLL
-    robot.travel(joints)
-
-
-def first_feasible(robot: Robot, tool: HeldTool, sweeps: Iterable[Sweep], limit: int = 30) -> Motion | None:
-    """The motion for the first of the sweeps (at most `limit` are tried) that the arm can do."""
+def first_feasible(
+    robot: Robot, tool: HeldTool, obj: str, sweeps: Iterable[Sweep], limit: int = 100
+) -> Motion | None:
+    """The motion for the first of the sweeps (at most `limit` are tried) that the arm can do, touching
+    nothing but the object."""
+    robot.look({tool.hand: (tool.name, tool.X_HT)})
     for sweep in itertools.islice(sweeps, limit):
-        motion = _solve(robot, tool, sweep)
+        motion = _solve(robot, tool, obj, sweep)
         if motion is not None:
             return motion
     return None
 
 
-def _solve(robot: Robot, tool: HeldTool, sweep: Sweep) -> Motion | None:
+def _solve(robot: Robot, tool: HeldTool, obj: str, sweep: Sweep) -> Motion | None:
     # The head's lowest edge is the one away from the handle.
     half = tool.shape.width / 2 * (math.cos(sweep.pitch) + math.sin(sweep.pitch))
     low = robot.scene.table.height + half + FLOAT
@@ -236,7 +244,7 @@ def _solve(robot: Robot, tool: HeldTool, sweep: Sweep) -> Motion | None:
     for place in (sweep.end, sweep.start):
         if kinematics.solve(hand, at(place, low), rest, idle=idle, restarts=1) is None:
             return None
-    above = kinematics.solve(hand, at(sweep.start, low + LIFT), rest, idle=idle)
+    above = kinematics.solve(hand, at(sweep.start, low + LIFT), rest, idle=idle, accept=robot.clearance.free)
     if above is None:
         return None
     legs: list[list[Joints]] = []
@@ -252,12 +260,18 @@ def _solve(robot: Robot, tool: HeldTool, sweep: Sweep) -> Motion | None:
         legs.append(leg)
         joints = leg[-1]
     down, along, up = legs
-    return Motion(above, down, along, up, max(0.6, 0.95 * sweep.length / SPEED))
+    with robot.clearance.touching(hand, [obj]):
+        if not robot.clearance.free_path([above, *down, *along, *up]):
+            return None
+    way = robot.way(hand, above)
+    if way is None:
+        return None
+    return Motion(way, down, along, up, max(0.6, 0.95 * sweep.length / SPEED))
 
 
 def perform(robot: Robot, tool: HeldTool, motion: Motion) -> FailureReason:
     """Carry out a sweep and take the tool aside again."""
-    robot.travel(motion.above)
+    robot.go(motion.way)
     if robot.perception.held(tool.hand) != tool.name:
         return _lost(robot, tool.hand)
     robot.world.follow(motion.down, 1.0)
@@ -277,6 +291,34 @@ def _lost(robot: Robot, hand: str) -> FailureReason:
     return FailureReason.SLIPPED
 
 
+LAY_YAWS = (0.3, 0.0, 0.6, -0.3)  # rad outwards, at which a tool is laid down
+LAY_PLACES = ((-0.30, -0.26, -0.34, -0.22), (0.20, 0.15, 0.25, 0.10))  # m, x and |y| of the hand
+
+
+def lay_targets(robot: Robot, tool: HeldTool, *insets: float) -> Iterator[HandTarget]:
+    """Ways to lay the tool flat on a free place of the table, where it could also be held at `insets`
+    (metres from the end of its handle)."""
+    side = -1.0 if tool.hand == "LeftHand" else 1.0
+    low = robot.scene.table.height + tool.shape.width / 2 + FLOAT
+    others = [capsule for capsules in obstacles(robot, tool.name).values() for capsule in capsules]
+    middle = tool.grip - tool.shape.length / 2 + tool.shape.width / 2
+    for outwards, x, y in itertools.product(LAY_YAWS, *LAY_PLACES):
+        yaw, y = -side * outwards, side * y
+        along = np.array([math.cos(yaw), math.sin(yaw), 0.0])
+        centre = np.array([x, y, low]) - middle * along
+        covered = tool_footprint(tool.shape, (float(centre[0]), float(centre[1])), yaw)
+        if smallest_gap(covered, others) < MARGIN or not all(map(on_table, covered)):
+            continue
+        head = np.array([x, y, low]) - tool.grip * along
+        if all(_can_hold(robot, tool.held_at(inset), head, yaw) for inset in insets):
+            yield tool.target(head, yaw)
+
+
+def _can_hold(robot: Robot, tool: HeldTool, head: Vector, yaw: float) -> bool:
+    target = tool.target(head, yaw)
+    return robot.kinematics.solve(tool.hand, target, robot.rest(tool.hand)) is not None
+
+
 CARRY_YAWS: Sequence[float] = (0.7, 0.5, 0.9, 0.3)  # rad outwards
 CARRY_PLACE = (-0.22, 0.22)  # m, x and |y| of the hand
 CARRY_LIFT = 0.18  # m above the table
@@ -289,13 +331,18 @@ def carry_tool(robot: Robot, hand: str, name: str) -> None:
     side = -1.0 if hand == "LeftHand" else 1.0
     x, y = CARRY_PLACE[0], side * CARRY_PLACE[1]
     height = robot.scene.table.height + CARRY_LIFT
+    robot.look()
     for outwards in CARRY_YAWS:
         yaw = -side * outwards
         head = np.array([x - tool.grip * math.cos(yaw), y - tool.grip * math.sin(yaw), height])
         joints = robot.kinematics.solve(
-            hand, tool.target(head, yaw), robot.rest(hand), idle=robot.idle_target(hand)
+            hand,
+            tool.target(head, yaw),
+            robot.rest(hand),
+            idle=robot.idle_target(hand),
+            accept=robot.clearance.free,
         )
         if joints is not None:
-            robot.travel(joints)
+            robot.travel(hand, joints)
             break
     robot.grips[hand].carrying = robot.world.command

@@ -9,7 +9,7 @@ import numpy as np
 from cognitive_arch.execution.environment import FailureReason
 from sim.kinematics import Vector
 from sim.robot import Robot
-from sim.skills.bare import Stance, clear, forearm_is_clear, obstacles, stance, unusable, upright_pitch
+from sim.skills.bare import Stance, clear, obstacles, stance, unusable, upright_pitch
 from sim.world import Joints
 
 ABOVE = 0.09  # m over the object from which the finger tips come
@@ -40,13 +40,13 @@ def touch(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         touched = touched or world.hand_touches(hand, obj)
         return touched
 
-    above, near, end = path
-    robot.travel(above)
+    way, near, end = path
+    robot.go(way)
     world.follow([near], 0.9, felt)
     world.follow([end], (SLOW + DEEPEST) / SPEED, felt)
     if touched:
         world.hold(DWELL)
-    world.follow([near, above], 0.9)
+    world.follow([near, way[-1]], 0.9)
     robot.go_home(hand)
     if not touched:
         return FailureReason.NO_CONTACT
@@ -56,9 +56,10 @@ def touch(robot: Robot, args: tuple[str, ...]) -> FailureReason:
 
 def _plan(
     robot: Robot, obj: str, hand: str, p_WT: Vector
-) -> tuple[tuple[Joints, Joints, Joints] | None, FailureReason]:
-    """Joints above the object, just over it and a little below its top."""
+) -> tuple[tuple[list[Joints], Joints, Joints] | None, FailureReason]:
+    """The way to above the object, joints just over it and a little below its top."""
     others = obstacles(robot, obj)
+    robot.look()
     height = float(p_WT[2]) - robot.scene.table.height
     place = (float(p_WT[0]), float(p_WT[1]))
     pitch = upright_pitch(robot.postures[hand])
@@ -68,13 +69,13 @@ def _plan(
         if not clear(robot, held.covers(place, height), others):
             blocked = True
             continue
-        path = _solve(robot, held, p_WT)
-        if path is not None and forearm_is_clear(robot, hand, path[-1], others):
+        path = _solve(robot, obj, held, p_WT)
+        if path is not None:
             return path, FailureReason.NONE
     return None, FailureReason.BLOCKED if blocked else FailureReason.OUT_OF_REACH
 
 
-def _solve(robot: Robot, held: Stance, p_WT: Vector) -> tuple[Joints, Joints, Joints] | None:
+def _solve(robot: Robot, obj: str, held: Stance, p_WT: Vector) -> tuple[list[Joints], Joints, Joints] | None:
     idle, joints = robot.idle_target(held.hand), robot.rest(held.hand)
     path = []
     for over in (ABOVE, SLOW, -DEEPEST):
@@ -85,4 +86,8 @@ def _solve(robot: Robot, held: Stance, p_WT: Vector) -> tuple[Joints, Joints, Jo
         path.append(step)
         joints = step
     above, near, end = path
-    return above, near, end
+    with robot.clearance.touching(held.hand, [obj]):
+        if not robot.clearance.free_path(path):
+            return None
+    way = robot.way(held.hand, above)
+    return None if way is None else (way, near, end)

@@ -1,0 +1,48 @@
+"""Taking a tool at another place of its handle: what is near is swept with a short grip, what is far with a
+long one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+from cognitive_arch.execution.environment import FailureReason
+from sim.kinematics import Vector
+from sim.robot import Robot
+from sim.skills.grasp import take
+from sim.skills.put import set_down
+from sim.skills.tool import HeldTool, Motion, Sweep, first_feasible, held_tool, lay_targets, perform
+
+INSETS = (0.03, 0.08, 0.12)  # m from the end of the handle
+SAME = 0.02  # m; another grip is not worth while that near to the present one
+
+Sweeps = Callable[[Robot, HeldTool, str], Iterator[Sweep]]
+
+
+def sweep_with_tool(robot: Robot, tool: HeldTool, obj: str, error: Vector, sweeps: Sweeps) -> FailureReason:
+    """Carry out the first of the sweeps of `obj` that the arm can do, if need be with another grip.
+
+    The robot believes the tool's head to be off by `error` (metres).
+    """
+
+    def plan(tool: HeldTool) -> Motion | None:
+        believed = tool.with_head_off(error)
+        return first_feasible(robot, believed, obj, sweeps(robot, believed, obj))
+
+    motion = plan(tool)
+    if motion is None:
+        reason = _regrip(robot, tool, plan)
+        if reason is not FailureReason.NONE:
+            return reason
+        regripped = held_tool(robot, tool.name, tool.hand)
+        motion = plan(regripped) if regripped is not None else None
+    return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
+
+
+def _regrip(robot: Robot, tool: HeldTool, plan: Callable[[HeldTool], Motion | None]) -> FailureReason:
+    """Lay the tool down and take it where something can be done with it."""
+    for inset in INSETS:
+        other = tool.held_at(inset)
+        if abs(other.grip - tool.grip) >= SAME and plan(other) is not None:
+            reason = set_down(robot, tool.hand, lay_targets(robot, tool, inset))
+            return reason if reason is not FailureReason.NONE else take(robot, tool.name, tool.hand, (inset,))
+    return FailureReason.OUT_OF_REACH
