@@ -312,10 +312,11 @@ def _set_gains(plant: MultibodyPlant) -> None:
 def _let_robot_overlap_itself(
     plant: MultibodyPlant, scene_graph: SceneGraph, robot: ModelInstanceIndex
 ) -> None:
-    """The primitives of neighbouring links overlap by construction; only their contacts are dropped."""
-    own = GeometrySet()
-    for index in plant.GetBodyIndices(robot):
-        frame = plant.GetBodyFrameIdIfExists(index)
-        if frame is not None:
-            own.Add(frame)
-    scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(own))
+    """The primitives of neighbouring links overlap by construction: only the two arms meet each other."""
+    for other_arm in ("l_", "r_"):
+        own = GeometrySet()
+        for index in plant.GetBodyIndices(robot):
+            frame = plant.GetBodyFrameIdIfExists(index)
+            if frame is not None and not plant.get_body(index).name().startswith(other_arm):
+                own.Add(frame)
+        scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(own))
