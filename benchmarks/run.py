@@ -18,8 +18,8 @@ from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.planning.registry import make_planner
 from cognitive_arch.session import RunConfig, Session, Setting, run_task
 from cognitive_arch.world.anchoring import WorldModel
-from sim.check import HAND_PAIRS, attempt
 from sim.environment import DrakeEnvironment
+from sim.trials import HAND_PAIRS, attempt
 
 SANDWICH = "make a ham sandwich"
 

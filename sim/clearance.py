@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 
 import numpy as np
@@ -17,15 +17,13 @@ from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
 
 from cognitive_arch.world.observation import HANDS
 from sim.assets import TRUNK
-from sim.hands import SIDES
+from sim.hands import SIDES, hand_links
 from sim.scenario import TIME_STEP, drake_shape, populate, solid_parts
 from sim.world import PARK, Joints, World
 
 MARGIN = 0.006  # m that the robot keeps from what it does not mean to touch
 HAND_MARGIN = 0.0015  # m that hands, and what they hold, keep: they work between things that lie close
 STEP = 0.08  # rad of the fastest joint between two configurations that are looked at
-_HAND = ("hand", "finger", "knuckle")
-_ARM = ("upper_arm", "forearm", *_HAND)
 
 Pair = tuple[BodyIndex, BodyIndex]
 
@@ -49,22 +47,24 @@ class Clearance:
         self._base = world.configuration(world.home)
         self._watch_arms()
         # Tools sweep over the table, and finger tips come down to it.
-        for link in self._links(_HAND):
+        for link in itertools.chain.from_iterable(map(self._links, HANDS)):
             self._checker.SetPaddingOneRobotBodyAllEnvironmentPairs(link, HAND_MARGIN)
             self._checker.SetPaddingBetween(link, table.index(), 0.0)
 
-    def _links(self, parts: Collection[str], hand: str | None = None) -> list[BodyIndex]:
-        side = f"{SIDES[hand]}_" if hand else ""
+    def _links(self, hand: str, *more: str) -> list[BodyIndex]:
+        """The links of a hand, and those of its arm named in `more`."""
+        names = hand_links(SIDES[hand]) | {f"{SIDES[hand]}_{link}" for link in more}
         bodies = (self._plant.get_body(index) for index in self._plant.GetBodyIndices(self._robot))
-        return [b.index() for b in bodies if b.name().startswith(side) and any(p in b.name() for p in parts)]
+        return [body.index() for body in bodies if body.name() in names]
 
     def _watch_arms(self) -> None:
         """Of the robot's own links the two arms are kept apart, and the hands from trunk and head."""
         own = self._plant.GetBodyIndices(self._robot)
         trunk = [self._plant.GetBodyByName(name).index() for name in (*TRUNK, "head")]
-        left, right = (self._links(_ARM, hand) for hand in HANDS)
+        left, right = (self._links(hand, "forearm", "upper_arm") for hand in HANDS)
         watched = {*itertools.product(left, right)}
-        watched |= {*itertools.product(self._links((*_HAND, "forearm")), trunk)}
+        for hand in HANDS:
+            watched |= {*itertools.product(self._links(hand, "forearm"), trunk)}
         self._filter(itertools.combinations(own, 2), True)
         self._filter(watched, False)
 
@@ -120,7 +120,7 @@ class Clearance:
     def touching(self, hand: str, names: Iterable[str]) -> Iterator[None]:
         """Meanwhile the hand, or what it holds, may touch these objects."""
         objects = [self._objects[name].index() for name in names]
-        with self._allowing(set(itertools.product(self._links(_HAND, hand), objects))):
+        with self._allowing(set(itertools.product(self._links(hand), objects))):
             yield
 
     @contextmanager

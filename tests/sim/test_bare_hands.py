@@ -10,11 +10,11 @@ import pytest
 
 from cognitive_arch.domain import Domain, Placement, Scene
 from cognitive_arch.execution.environment import FailureReason, Outcome
-from sim.check import BARE_TRIALS, TAPPED, bare_scene, use_hand
 from sim.environment import DrakeEnvironment
 from sim.hands import BENDS, PALM_SIGN, SIDES, Posture, finger_line, is_hand_joint, limbs
 from sim.kinematics import DOWN, HandTarget, Kinematics, fingertip, palm_axis
 from sim.skills.bare import stance
+from sim.trials import TAPPED, bare_scene, use_hand
 from tests.conftest import action
 
 HANDS = ("LeftHand", "RightHand")
@@ -129,10 +129,10 @@ def test_refusals_move_nothing(crowded: DrakeEnvironment, call: str, reason: Fai
         ("tapFromLeft", "RightHand", Posture.ARCHED),  # with the back of the hand
         ("tapFromRight", "LeftHand", Posture.BENT),
         ("tapFromRight", "RightHand", Posture.STRAIGHT),
-        ("push-hand", "LeftHand", Posture.STRAIGHT),
-        ("push-hand", "RightHand", Posture.BENT),
-        ("pull-hand", "LeftHand", Posture.BENT),
-        ("pull-hand", "RightHand", Posture.ARCHED),
+        ("push", "LeftHand", Posture.STRAIGHT),
+        ("push", "RightHand", Posture.BENT),
+        ("pull", "LeftHand", Posture.BENT),
+        ("pull", "RightHand", Posture.ARCHED),
         ("touch", "LeftHand", Posture.ARCHED),
         ("lift", "RightHand", Posture.STRAIGHT),
     ],
@@ -140,8 +140,8 @@ def test_refusals_move_nothing(crowded: DrakeEnvironment, call: str, reason: Fai
 def test_what_a_bare_hand_does(domain: Domain, what: str, hand: str, posture: Posture) -> None:
     """It moves the object the right way (or not at all), and nothing else."""
     environment = DrakeEnvironment(domain, bare_scene("Bun-bottom", hand), jitter=0.02)
-    ok, said, _ = use_hand(environment, BARE_TRIALS[what], "Bun-bottom", hand, posture, 0)
-    assert ok, said
+    trial = use_hand(environment, what, posture, "Bun-bottom", hand, 0)
+    assert trial.ok, trial.said
 
 
 @pytest.mark.physics

@@ -22,9 +22,9 @@ from cognitive_arch.execution.environment import FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.runlog.trajectory import Trajectory
 from cognitive_arch.session import Progress, RunConfig, resume_task, run_task
-from sim.check import HAND_PAIRS, attempt, sandwich, stacked
 from sim.environment import DrakeEnvironment
 from sim.pictures import Stage, write_video
+from sim.trials import HAND_PAIRS, attempt, sandwich, stacked
 from tests.conftest import action
 from tests.sim.physics import check_physics
 

@@ -9,9 +9,9 @@ import pytest
 
 from cognitive_arch.domain import Domain, Scene, jittered, load_scene
 from cognitive_arch.execution.environment import FailureReason, Outcome
-from sim.check import mirrored
 from sim.environment import DrakeEnvironment
 from sim.footprint import Capsule, disc, gap, smallest_gap, tool_footprint
+from sim.trials import mirrored
 from tests.conftest import action
 from tests.sim.physics import check_physics
 
