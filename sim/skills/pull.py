@@ -28,7 +28,7 @@ from sim.skills.tool import (
 BEHIND = 0.015  # m between the bar and the object when the tool comes down
 BESIDE = 0.005  # m between the shaft and the object
 ROOM = 0.030  # m around the object where it ends up: fingers must fit in
-CLOSER = (0.12, 0.135, 0.15, 0.175, 0.20, 0.24)  # m that a pull may bring an object closer
+CLOSER = (0.113, 0.125, 0.14, 0.16, 0.18, 0.20, 0.24)  # m that a pull may bring an object closer
 SIDEWAYS = tuple(round(float(y), 2) for y in np.arange(-0.21, 0.22, 0.03))  # m, y where it may end up
 NEAREST_END = -0.30  # m, x
 SKEWS = (0.0, 0.2, -0.2, 0.4, -0.4, 0.6, -0.6, 0.9, -0.9)  # rad

@@ -25,7 +25,7 @@ from sim.skills.tool import (
 
 BEFORE = 0.015  # m between the head and the object when the tool comes down
 DISTANCES = (0.12, 0.16, 0.20, 0.24)  # m that an object may be pushed
-COURSES = (0.0, 0.25, -0.25, 0.5, -0.5)  # rad from straight away
+COURSES = (0.0, 0.25, -0.25, 0.5, -0.5, 0.75, -0.75, 1.0, -1.0)  # rad from straight away
 SKEWS = (0.0, 0.2, -0.2, 0.4, -0.4)  # rad of a bar to its course; a tip pushes straight or not at all
 RIM = 0.04  # m that stay between a pushed object and the table's edge
 ROOM = 0.01  # m around the object where it ends up

@@ -30,6 +30,7 @@ LEVEL = 0.012  # rad; at the far end of a shaft this is 4 mm
 YAW_TOLERANCE = 0.03  # rad
 PITCHES = (0.0, 0.15, 0.22)  # rad by which the handle may be higher than the head
 NEAREST, NEAR, FARTHEST = -0.15, -0.24, -0.47  # m, x of a hand that holds a tool level
+HARDLY = 0.8  # of `discomfort`: of what is worse, nothing was ever feasible
 PALM_HEIGHT = 0.045  # m above the table: what is taller must not be under the palm
 _SHAFT_PARTS = 6
 _PIECE = 0.03  # m between two waypoints, or two looks at what is in the way
@@ -218,12 +219,15 @@ def is_free(robot: Robot, tool: HeldTool, sweep: Sweep, others: dict[str, tuple[
 
 
 def first_feasible(
-    robot: Robot, tool: HeldTool, obj: str, sweeps: Iterable[Sweep], limit: int = 100
+    robot: Robot, tool: HeldTool, obj: str, sweeps: Iterable[Sweep], limit: int = 60
 ) -> Motion | None:
-    """The motion for the first of the sweeps (at most `limit` are tried) that the arm can do, touching
-    nothing but the object."""
+    """The motion for the first of the sweeps that the arm can do, touching nothing but the object.
+
+    At most `limit` are tried, and none that the hand can hardly reach.
+    """
     robot.look({tool.hand: (tool.name, tool.X_HT)})
-    for sweep in itertools.islice(sweeps, limit):
+    likely = (sweep for sweep in sweeps if discomfort(tool, sweep) <= HARDLY)
+    for sweep in itertools.islice(likely, limit):
         motion = _solve(robot, tool, obj, sweep)
         if motion is not None:
             return motion
@@ -244,29 +248,47 @@ def _solve(robot: Robot, tool: HeldTool, obj: str, sweep: Sweep) -> Motion | Non
     for place in (sweep.end, sweep.start):
         if kinematics.solve(hand, at(place, low), rest, idle=idle, restarts=1) is None:
             return None
-    above = kinematics.solve(hand, at(sweep.start, low + LIFT), rest, idle=idle, accept=robot.clearance.free)
-    if above is None:
+    corners = [
+        at(sweep.start, low + LIFT),
+        at(sweep.start, low),
+        at(sweep.end, low),
+        at(sweep.end, low + END_LIFT),
+    ]
+    pieces = [4, max(2, math.ceil(sweep.length / _PIECE)), 3]
+    path = _through(robot, hand, corners, pieces)
+    if path is None:
+        # From the other end the arm may come to bend in another way.
+        backwards = _through(robot, hand, corners[::-1], pieces[::-1])
+        path = backwards[::-1] if backwards else None
+    if path is None:
         return None
-    legs: list[list[Joints]] = []
-    joints: Joints = above
-    for begin, end, pieces in (
-        (at(sweep.start, low + LIFT), at(sweep.start, low), 4),
-        (at(sweep.start, low), at(sweep.end, low), max(2, math.ceil(sweep.length / _PIECE))),
-        (at(sweep.end, low), at(sweep.end, low + END_LIFT), 3),
-    ):
-        leg = kinematics.line(hand, begin, end.p_WP, joints, idle=idle, pieces=pieces)
-        if leg is None:
-            return None
-        legs.append(leg)
-        joints = leg[-1]
-    down, along, up = legs
     with robot.clearance.touching(hand, [obj]):
-        if not robot.clearance.free_path([above, *down, *along, *up]):
+        if not robot.clearance.free_path(path):
             return None
-    way = robot.way(hand, above)
+    way = robot.way(hand, path[0])
     if way is None:
         return None
-    return Motion(way, down, along, up, max(0.6, 0.95 * sweep.length / SPEED))
+    down, along, up = pieces[0] + 1, pieces[0] + pieces[1] + 1, len(path)
+    seconds = max(0.6, 0.95 * sweep.length / SPEED)
+    return Motion(way, path[1:down], path[down:along], path[along:up], seconds)
+
+
+def _through(
+    robot: Robot, hand: str, corners: Sequence[HandTarget], pieces: Sequence[int]
+) -> list[Joints] | None:
+    """Joints at the first corner, and waypoints along straight lines from each to the next, in so many
+    pieces."""
+    kinematics, idle = robot.kinematics, robot.idle_target(hand)
+    joints = kinematics.solve(hand, corners[0], robot.rest(hand), idle=idle, accept=robot.clearance.free)
+    if joints is None:
+        return None
+    path = [joints]
+    for (begin, end), n in zip(itertools.pairwise(corners), pieces, strict=True):
+        leg = kinematics.line(hand, begin, end.p_WP, path[-1], idle=idle, pieces=n)
+        if leg is None:
+            return None
+        path += leg
+    return path
 
 
 def perform(robot: Robot, tool: HeldTool, motion: Motion) -> FailureReason:
