@@ -14,7 +14,9 @@ from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
+from sim.clearance import Clearance
 from sim.hands import Posture
+from sim.kinematics import Kinematics
 from sim.meddling import disturb
 from sim.noise import EpisodeNoise, PhysicalNoise
 from sim.pictures import LARGE, SMALL, Stage, View, save_picture, write_recording, write_video
@@ -59,6 +61,8 @@ class DrakeEnvironment:
         self._jitter = jitter
         self._reach = scene.reach if reach == "published" else None
         self.world = World(domain, scene, friction=friction)
+        self._kinematics = Kinematics(self.world.joint_names, scene.table.height)
+        self._clearance = Clearance(self.world)
         self.recorder = Recorder(self.world, keep=record)
         self._stage = Stage(domain, scene) if record else None
         self._video = video
@@ -84,7 +88,16 @@ class DrakeEnvironment:
 
     def _new_robot(self, rng: np.random.Generator) -> Robot:
         noise = EpisodeNoise(self._noise, self.world, rng)
-        return Robot(self._domain, self._scene, self.world, noise, rng, reach=self._reach)
+        return Robot(
+            self._domain,
+            self._scene,
+            self.world,
+            noise,
+            rng,
+            self._kinematics,
+            self._clearance,
+            reach=self._reach,
+        )
 
     def observe(self) -> Observation:
         """See `Environment.observe`."""

@@ -25,6 +25,7 @@ TIP_CLEARANCE = 0.02  # m that an idle hand's finger tips keep above the table
 FOREARM_CLEARANCE = FOREARM["radius"] + 0.010  # m that the axes of both forearms do
 MAX_LEAN = 0.40  # rad that the torso may lean forward; farther, and the head hangs over the table
 APPROACH = 0.09  # m above its target that a hand comes down from
+OUT_OF_REACH = -0.60  # m, x: no arm gets that far
 REACH_MARGIN = 0.008  # m: where a hand only just gets to, it cannot turn as an object asks for
 RESTARTS = 3
 RAISED_TILT = 0.15  # rad by which a hand may tilt on its way
@@ -215,6 +216,8 @@ class Kinematics:
     def reaches(self, hand: str, x: float, y: float) -> bool:
         """Whether `hand` can come down on something on the table at (x, y), metres; remembered per 5 mm."""
         key = (hand, round(x / 0.005), round(y / 0.005))
+        if x < OUT_OF_REACH:
+            return False
         if key not in self._reach:
             place = np.array([key[1] * 0.005 - REACH_MARGIN, key[2] * 0.005, self._table_height + 0.003])
             target = HandTarget(fingertip(hand), place, palm_axis(hand), DOWN, tilt=0.30)

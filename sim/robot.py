@@ -34,7 +34,7 @@ CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may b
 TOOL_TILT, TOOL_TURN = 0.06, 0.15  # rad, the same for a hand with a tool
 POSTURE_TIME = 0.6  # s to bend the fingers
 DETOURS = (0.12, 0.06)  # m by which a hand rises to get over what is in its way
-TRANSIT_SPEED = 0.9  # rad/s of the fastest joint between poses
+TRANSIT_SPEED, TOOL_SPEED = 1.4, 1.0  # rad/s of the fastest joint between poses, and with a tool in a hand
 
 
 @dataclass
@@ -85,14 +85,14 @@ class Robot:
     world: World
     noise: EpisodeNoise
     rng: np.random.Generator
+    kinematics: Kinematics
+    clearance: Clearance
     grips: dict[str, Grip] = field(default_factory=dict)
     reach: ReachLimits | None = None
     postures: dict[str, Posture] = field(default_factory=lambda: dict.fromkeys(HANDS, Posture.STRAIGHT))
     measured: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self.kinematics = Kinematics(self.world.joint_names, self.scene.table.height)
-        self.clearance = Clearance(self.world)
         self._hand_joints = np.array([is_hand_joint(name) for name in self.world.joint_names])
         self.perception = OraclePerception(self.world, self.kinematics, self.reach)
 
@@ -167,7 +167,9 @@ class Robot:
         """Through waypoints as fast as the fastest joint may (minimum jerk peaks at 1.9 times its mean)."""
         path = [self.world.command, *waypoints]
         length = sum(float(np.abs(b - a).max()) for a, b in itertools.pairwise(path))
-        self.world.follow(waypoints, max(0.6, 1.9 * length / TRANSIT_SPEED))
+        held = [self.perception.held(hand) for hand in self.grips]
+        tools = any(name and self.domain.objects[name].kind == "tool" for name in held)
+        self.world.follow(waypoints, max(0.6, 1.9 * length / (TOOL_SPEED if tools else TRANSIT_SPEED)))
 
     def travel(self, hand: str, joints: Joints) -> None:
         """Go to `joints` with `hand` round what is in the way, or straight if there is no way round."""
