@@ -34,7 +34,7 @@ CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may b
 TOOL_TILT, TOOL_TURN = 0.06, 0.15  # rad, the same for a hand with a tool
 POSTURE_TIME = 0.6  # s to bend the fingers
 DETOURS = (0.12, 0.06)  # m by which a hand rises to get over what is in its way
-TRANSIT_SPEED, TOOL_SPEED = 1.4, 1.0  # rad/s of the fastest joint between poses, and with a tool in a hand
+TRANSIT_SPEED, TOOL_SPEED = 1.5, 1.3  # rad/s of the fastest joint between poses, and with a tool in a hand
 
 
 @dataclass

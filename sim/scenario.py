@@ -47,7 +47,7 @@ from cognitive_arch.domain import Domain, ObjectSpec, Scene
 from sim.assets import robot_urdf
 from sim.hands import PAD_RADIUS, PAD_STIFFNESS, is_hand_joint
 
-TIME_STEP = 0.004  # s
+TIME_STEP = 0.005  # s
 TABLE_SIZE = (0.70, 0.90, 0.04)  # m
 TABLE_CENTRE_X = -0.50  # m
 FRICTION = 0.8
@@ -62,6 +62,7 @@ GAINS: Mapping[str, tuple[float, float]] = {  # N m/rad and N m s/rad; N/m and N
     "carriage": (6000.0, 100.0),
     "knuckle": (10.0, 0.2),
 }
+PAD_SPACING = 0.12  # m at most between the small spheres under long things
 ROTOR_INERTIA, GEAR_RATIO = 1e-5, 100.0
 _TABLE_COLOR = [0.62, 0.50, 0.38, 1.0]
 _LEG_COLOR = [0.35, 0.30, 0.26, 1.0]
@@ -274,7 +275,7 @@ def _pad_places(shape: shapes.Cylinder | shapes.Box) -> list[tuple[float, float]
     """Where the small spheres sit on the underside (metres): an outer and an inner ring, or a grid."""
     if isinstance(shape, shapes.Cylinder):
         outer, inner = shape.radius - PAD_RADIUS, shape.radius * 0.55
-        rings = [(outer, 8), (inner, 4)]
+        rings = [(outer, 6), (inner, 3)]
     elif max(shape.size[:2]) <= 0.08:
         half = min(shape.size[:2]) / 2 - PAD_RADIUS
         corners = [
@@ -287,7 +288,7 @@ def _pad_places(shape: shapes.Cylinder | shapes.Box) -> list[tuple[float, float]
         ]
     else:
         xs, ys = (
-            np.linspace(-s / 2 + PAD_RADIUS, s / 2 - PAD_RADIUS, max(2, math.ceil(s / 0.06) + 1))
+            np.linspace(-s / 2 + PAD_RADIUS, s / 2 - PAD_RADIUS, max(2, math.ceil(s / PAD_SPACING) + 1))
             for s in shape.size[:2]
         )
         return [(float(x), float(y)) for x in xs for y in ys]
