@@ -75,7 +75,7 @@ class OraclePerception:
     def _fallen(self, name: str) -> bool:
         return bool(self._world.pose(name).translation()[2] < self._world.scene.table.height - FALLEN)
 
-    def _can_take(self, hand: str, name: str) -> bool:
+    def can_take(self, hand: str, name: str) -> bool:
         """Whether the hand gets to where the object is held: its middle, or a tool's handle."""
         shape, X_WO = self._world.domain.objects[name].shape, self._world.pose(name)
         if self._limits is not None:
@@ -118,7 +118,7 @@ class OraclePerception:
             if world.domain.objects[t].kind == "tool" and t != name and not self._fallen(t)
         ]
         holder = next((hand for hand in HANDS if self.held(hand) == name), None)
-        hands = [hand for hand in HANDS if holder or self._can_take(hand, name)]
+        hands = [hand for hand in HANDS if holder or self.can_take(hand, name)]
         by_tool = [tool for tool in tools if hands or self._tool_reaches(tool, x, y)]
         return ObjectObservation(
             name=name,

@@ -62,7 +62,8 @@ def pick_up(
     robot.look()
     plan = _plan(robot, name, hand, grip, aim, insets)
     if plan is None:
-        return FailureReason.OUT_OF_REACH, []
+        reachable = robot.perception.can_take(hand, name)
+        return FailureReason.BLOCKED if reachable else FailureReason.OUT_OF_REACH, []
     world = robot.world
     robot.go(plan.way)
     world.follow(plan.down, 1.0)

@@ -29,6 +29,8 @@ def sweep_with_tool(robot: Robot, tool: HeldTool, obj: str, error: Vector, sweep
         return first_feasible(robot, believed, obj, sweeps(robot, believed, obj))
 
     motion = plan(tool)
+    if motion is None and next(iter(sweeps(robot, tool, obj)), None) is None:
+        return FailureReason.BLOCKED
     if motion is None:
         reason = _regrip(robot, tool, plan)
         if reason is not FailureReason.NONE:

@@ -72,7 +72,7 @@ def test_what_a_stick_cannot_do(complex_scene: DrakeEnvironment) -> None:
     assert complex_scene.execute(action("graspWith(Stick,LeftHand)")).outcome is Outcome.SUCCESS
     refused = complex_scene.execute(action("pull(Ham,Stick,LeftHand)"))
     assert refused.reason is FailureReason.CANNOT_PULL
-    pushed = complex_scene.execute(action("push(Bun-bottom,Stick,LeftHand)"))
+    pushed = complex_scene.execute(action("push(Ham,Stick,LeftHand)"))
     assert pushed.reason is FailureReason.NONE
     assert pushed.effect["displacement_x"] < -0.10
     assert complex_scene.robot.perception.held("LeftHand") == "Stick"
