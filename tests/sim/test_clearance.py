@@ -52,7 +52,7 @@ def test_only_what_may_be_touched_may_be_touched(simple: DrakeEnvironment) -> No
     robot = simple.robot
     robot.look()
     x, y, z = robot.world.pose("Ham").translation()
-    into = reaching(simple, "RightHand", (float(x), float(y) + 0.03, float(z) + 0.004))
+    into = reaching(simple, "RightHand", (float(x), float(y) - 0.03, float(z) + 0.004))
     assert not robot.clearance.free(into)
     with robot.clearance.touching("RightHand", ["Bun-top"]):
         assert not robot.clearance.free(into)
