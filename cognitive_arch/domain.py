@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -24,7 +25,7 @@ from pydantic import (
 
 from cognitive_arch import resources
 from cognitive_arch.errors import ConfigError, one_line, unknown
-from cognitive_arch.footprint import outer_radius
+from cognitive_arch.footprint import footprint, outer_radius, smallest_gap
 from cognitive_arch.outside import Happening, OutsideEvent, check_events
 from cognitive_arch.shapes import Frozen, Shape
 from cognitive_arch.world.observation import HANDS
@@ -178,7 +179,6 @@ def jittered(scene: Scene, amount: float, rng: np.random.Generator, domain: Doma
     placements = dict(sorted(scene.objects.items()))
     if amount <= 0:
         return placements
-    radii = {name: _radius(domain.objects[name].shape) for name in placements}
     for _ in range(200):
         moved = {}
         for name, placement in placements.items():
@@ -186,18 +186,20 @@ def jittered(scene: Scene, amount: float, rng: np.random.Generator, domain: Doma
             x, y = placement.position
             turned = placement.yaw + placement.turn * yaw
             moved[name] = Placement(position=(x + amount * dx, y + amount * dy), yaw=turned)
-        pairs = itertools.combinations(moved, 2)
-        if all(
-            math.dist(moved[a].position, moved[b].position) >= max(MIN_DISTANCE, radii[a] + radii[b] + 0.01)
-            for a, b in pairs
-        ):
+        if all(_apart(moved, a, b, domain) for a, b in itertools.combinations(moved, 2)):
             return moved
     raise ConfigError(f"objects of scene {scene.name} cannot be moved by {amount:g} m without overlap")
 
 
-def _radius(shape: Shape) -> float:
-    """Metres about its middle that a thing needs, whichever way it is turned; tools lie among the others."""
-    return 0.0 if shape.type == "tool" else outer_radius(shape)
+def _apart(placements: Mapping[str, Placement], a: str, b: str, domain: Domain) -> bool:
+    """Whether two things lie side by side with room between them; tools may lie close to others."""
+    one, other = (domain.objects[name].shape for name in (a, b))
+    distance = math.dist(placements[a].position, placements[b].position)
+    if "tool" in (one.type, other.type):
+        covered = footprint(one, placements[a].position, placements[a].yaw)
+        others = footprint(other, placements[b].position, placements[b].yaw)
+        return distance >= MIN_DISTANCE and smallest_gap(covered, others) > 0
+    return distance >= max(MIN_DISTANCE, outer_radius(one) + outer_radius(other) + 0.01)
 
 
 def read_yaml(path: Path, what: str) -> Any:
@@ -239,44 +241,3 @@ def load_domain(name: str) -> Domain:
         return Domain.model_validate(read_yaml(path, "domain"))
     except ValidationError as error:
         raise explain_invalid(error, path, Domain) from None
-
-
-def scene_paths() -> dict[str, Path]:
-    """Scenes that come with the installation: name -> file, sorted by name."""
-    paths = sorted(resources.domains_dir().glob("*/scenes/*.yaml"))
-    return {p.stem: p for p in paths}
-
-
-def load_scene(name_or_path: str) -> Scene:
-    """Read a scene by its name or from a file (anything with a slash or ending in .yaml), or make the
-    one that `random:SEED` stands for (see `random_scenes`).
-
-    Raises `ConfigError` if there is none, or it is malformed, or speaks of objects its domain does not
-    know.
-    """
-    from cognitive_arch import random_scenes  # which is built on this module
-
-    if random_scenes.is_random(name_or_path):
-        return random_scenes.scene_from_name(name_or_path)
-    known = scene_paths()
-    if name_or_path in known:
-        path = known[name_or_path]
-    elif name_or_path.endswith((".yaml", ".yml")) or "/" in name_or_path:
-        path = Path(name_or_path)
-    else:
-        raise ConfigError(
-            unknown("scene", name_or_path, known) + f", {random_scenes.FORM}, or the path of a .yaml file"
-        )
-    try:
-        scene = Scene.model_validate(read_yaml(path, "scene"))
-    except ValidationError as error:
-        raise explain_invalid(error, path, Scene) from None
-    domain = load_domain(scene.domain)
-    for name in scene.objects:
-        if name not in domain.objects:
-            raise ConfigError(f"{path}: {unknown('object', name, domain.objects)}")
-    try:
-        check_events(scene.events, scene.objects, domain.objects)
-    except ConfigError as error:
-        raise ConfigError(f"{path}: {error}") from None
-    return scene

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cognitive_arch.domain import Domain, Scene, load_domain, load_scene
+from cognitive_arch.domain import Domain, Scene, load_domain
 from cognitive_arch.errors import BackendError, ConfigError, RuleError, StoreError, one_line, unknown
 from cognitive_arch.evaluation.metrics import speed
 from cognitive_arch.execution.backends import BACKENDS, make_environment, reach_model
@@ -33,6 +33,7 @@ from cognitive_arch.relational.rules import Entity, RuleSet
 from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction
 from cognitive_arch.runlog.records import action_record, result_record, versions
 from cognitive_arch.runlog.store import Checkpoint, Run, RunStore, RunWriter
+from cognitive_arch.scenes import load_scene, scene_paths
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS
 
@@ -145,6 +146,11 @@ class RunConfig:
     video: bool = False
 
     def __post_init__(self) -> None:
+        # Files are found again wherever the run is gone on with.
+        for field in ("scene", "rules"):
+            name = getattr(self, field)
+            if name is not None and Path(name).is_file() and name not in scene_paths():
+                object.__setattr__(self, field, str(Path(name).absolute()))
         if not 0 <= self.seed < 2**63:
             raise ConfigError(f"seed {one_line(self.seed, 30)} is out of range; valid: 0 to {2**63 - 1}")
         if not 0 <= self.jitter <= 0.05:
@@ -302,8 +308,9 @@ def run_task(
         started += _compile(config, progress)
         name = f"{setting.scene.name}-{config.backend}-{config.seed}"
         manifest["physical_noise"] = list(environment.noise_told)
+        session = Session(config, setting, environment)  # what cannot be set up leaves no run behind
         with store.begin(name, manifest) as run:
-            episode = _Episode(config, setting, task, store, run, environment, started)
+            episode = _Episode(config, setting, task, store, run, environment, session, started)
             return episode.perform(progress, None)
 
 
@@ -323,7 +330,8 @@ def resume_task(name: str, store_folder: Path, progress: Progress = Progress()) 
                 checkpoint = writer.rewind()
                 after = f"after step {checkpoint.step}" if checkpoint else "from the start"
                 progress.on_notice(f"going on with {run.run_id} {after}")
-                episode = _Episode(config, setting, task, store, writer, environment, started)
+                session = Session(config, setting, environment)
+                episode = _Episode(config, setting, task, store, writer, environment, session, started)
                 return episode.perform(progress, checkpoint)
 
 
@@ -381,6 +389,7 @@ class _Episode:
     store: RunStore
     run: RunWriter
     environment: Environment
+    session: Session
     started: float
 
     def perform(self, progress: Progress, checkpoint: Checkpoint | None) -> dict[str, Any]:
@@ -391,7 +400,7 @@ class _Episode:
             raise RunInterrupted(self.run.run_id) from None
 
     def _perform(self, progress: Progress, checkpoint: Checkpoint | None) -> dict[str, Any]:
-        session = Session(self.config, self.setting, self.environment)
+        session = self.session
         progress.on_task(self.task)
         for line in self.environment.noise_told:
             progress.on_notice(f"noise        {line}")

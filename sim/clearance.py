@@ -58,7 +58,7 @@ class Clearance:
         return [body.index() for body in bodies if body.name() in names]
 
     def _watch_arms(self) -> None:
-        """Of the robot's own links the two arms are kept apart, and the hands from trunk and head."""
+        """Of the robot's own links: the arms from each other, hands and forearms from trunk and head."""
         own = self._plant.GetBodyIndices(self._robot)
         trunk = [self._plant.GetBodyByName(name).index() for name in (*TRUNK, "head")]
         left, right = (self._links(hand, "forearm", "upper_arm") for hand in HANDS)
@@ -106,6 +106,16 @@ class Clearance:
         """Whether nothing is too near at the waypoints (at least one) and between them."""
         return all(self.free(joints) for joints in _fine(waypoints))
 
+    def free_from(self, here: Joints, waypoints: Sequence[Joints]) -> bool:
+        """As `free_path` from `here`, but what is too near there may stay so until the way is free of it."""
+        places, near, away = list(_fine([here, *waypoints])), self._near(here), 0
+        if near:
+            away = next((i for i, joints in enumerate(places) if self.free(joints)), len(places))
+            with self._allowing(near):
+                if not all(map(self.free, places[:away])):
+                    return False
+        return all(map(self.free, places[away:]))
+
     def too_near(self, joints: Joints) -> tuple[tuple[str, str], ...]:
         """Pairs of bodies that are too near each other, sorted."""
         names = (tuple(self._plant.get_body(index).name() for index in pair) for pair in self._near(joints))
@@ -121,12 +131,6 @@ class Clearance:
         """Meanwhile the hand, or what it holds, may touch these objects."""
         objects = [self._objects[name].index() for name in names]
         with self._allowing(set(itertools.product(self._links(hand), objects))):
-            yield
-
-    @contextmanager
-    def leaving(self, joints: Joints) -> Iterator[None]:
-        """Meanwhile what is too near at `joints` may stay so: one has to get away from there somehow."""
-        with self._allowing(self._near(joints)):
             yield
 
     @contextmanager

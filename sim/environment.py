@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from cognitive_arch.domain import Domain, Scene, jittered
+from cognitive_arch.errors import StoreError
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
 from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
 from cognitive_arch.outside import OutsideEvent
@@ -158,9 +159,13 @@ class DrakeEnvironment:
         return self.observe()
 
     def _earlier(self) -> Trajectory | None:
-        """What was recorded of the episode before now, by another process."""
+        """What was recorded of the episode before now, by another process; nothing if that is damaged, for
+        a run can go on without."""
         path = None if self._folder is None else self._folder / TRAJECTORY
-        return Trajectory.load(path).until(self.world.time) if path and path.exists() else None
+        try:
+            return Trajectory.load(path).until(self.world.time) if path and path.exists() else None
+        except StoreError:
+            return None
 
     def record_into(self, folder: Path) -> None:
         """See `Environment.record_into`: `start.png` at once."""

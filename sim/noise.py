@@ -300,7 +300,11 @@ class EpisodeNoise:
         """The inverse of `save`; `take_effect` has to follow."""
         if sorted(saved) != self._noisy:
             raise ValueError(f"it has noise of {', '.join(sorted(saved)) or 'no arm'}")
-        self._arms = {hand: ArmState(**arm) for hand, arm in saved.items()}
+        arms = {hand: ArmState(**arm) for hand, arm in saved.items()}
+        for hand, arm in arms.items():
+            if {len(arm.offsets), len(arm.play)} - {0, len(self._world.arm_joints(hand))}:
+                raise ValueError(f"the noise of {hand} is of other joints")
+        self._arms = arms
 
     def _level(self, hand: str) -> float:
         return self._noise.level(_capability(hand))

@@ -111,6 +111,9 @@ class Stage:
                 f"the trajectory is of {', '.join(trajectory.object_names)}, the scene has "
                 f"{', '.join(sorted(self._starts))}"
             )
+        unknown = [name for name in trajectory.joint_names if not self.plant.HasJointNamed(name)]
+        if unknown:
+            raise StoreError(f"the trajectory is of another robot: it has {', '.join(unknown[:3])}")
         joints = [self.plant.GetJointByName(name).position_start() for name in trajectory.joint_names]
         for sample in range(len(trajectory)):
             positions = np.zeros(self.plant.num_positions())

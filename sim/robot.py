@@ -33,6 +33,7 @@ YAWS = (0.0, 0.4, -0.4, 0.8, -0.8, 1.2, -1.2)  # rad, of the fingers' closing di
 CARRY_TILT, CARRY_TOLERANCE = 0.12, 0.03  # rad and m by which a full hand may be moved meanwhile
 TOOL_TILT, TOOL_TURN = 0.06, 0.15  # rad, the same for a hand with a tool
 POSTURE_TIME = 0.6  # s to bend the fingers
+ASIDE = 1.3  # rad of the shoulder of an idle arm that is to leave room
 DETOURS = (0.12, 0.06)  # m by which a hand rises to get over what is in its way
 TRANSIT_SPEED, TOOL_SPEED = 1.5, 1.3  # rad/s of the fastest joint between poses, and with a tool in a hand
 
@@ -106,7 +107,10 @@ class Robot:
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """The inverse of `save`."""
-        self.grips = {hand: Grip.from_json(grip) for hand, grip in saved["grips"].items()}
+        grips = {hand: Grip.from_json(grip) for hand, grip in saved["grips"].items()}
+        if any(grip.carrying.shape != self.world.home.shape for grip in grips.values()):
+            raise ValueError("its grips are of other joints")
+        self.grips = grips
         self.noise.restore(saved["noise"])
         self.postures = {hand: Posture(saved["postures"][hand]) for hand in HANDS}
 
@@ -137,19 +141,21 @@ class Robot:
     def way(self, hand: str, joints: Joints) -> list[Joints] | None:
         """Waypoints of a collision-free way of `hand` to `joints`, or None; as seen by the last `look`.
 
-        If the straight way is not free, the hand first goes up, or by its home posture, or comes from above.
+        If the straight way is not free, the hand first goes up, or waits for the other arm, or goes by its
+        home posture, or comes from above.
         """
         here = self.world.command
         here = np.where(self._hand_joints, joints, here)
-        with self.clearance.leaving(here):
-            if self.clearance.free_path([here, joints]):
-                return [joints]
-            up = self._detour(hand, here)
-            over = self._detour(hand, joints)
-            home = [np.where(self._hand_joints, joints, self.rest(hand))]
-            for via in (up, over, [*up, *over], home, [*up, *home], [*home, *over], [*up, *home, *over]):
-                if via and self.clearance.free_path([here, *via, joints]):
-                    return [*via, joints]
+        if self.clearance.free_from(here, [joints]):
+            return [joints]
+        aside = [np.where(self._arm_joints(_other(hand)), joints, here)]
+        up = self._detour(hand, here)
+        over = self._detour(hand, joints)
+        home = [np.where(self._hand_joints, joints, self.rest(hand))]
+        ways = (up, over, [*up, *over], aside, [*aside, *over], home, [*up, *home], [*home, *over])
+        for via in (*ways, [*up, *home, *over]):
+            if via and self.clearance.free_from(here, [*via, joints]):
+                return [*via, joints]
         return None
 
     def _detour(self, hand: str, joints: Joints) -> list[Joints]:
@@ -185,10 +191,18 @@ class Robot:
     ) -> Descent | None:
         """A collision-free way down to `target`, where the hand, or what it holds, may touch some objects;
         None if there is none. `opening` is that of the fingers, metres."""
+        for near in self.starts(hand):
+            if opening is not None:
+                near = self.world.with_fingers(near, hand, opening)
+            found = self._descent_from(near, hand, target, touched)
+            if found is not None:
+                return found
+        return None
+
+    def _descent_from(
+        self, near: Joints, hand: str, target: HandTarget, touched: Collection[str]
+    ) -> Descent | None:
         high, idle = self.above(target), self.idle_target(hand)
-        near = self.rest(hand)
-        if opening is not None:
-            near = self.world.with_fingers(near, hand, opening)
         start = self.kinematics.solve(hand, high, near, idle=idle, accept=self.clearance.free)
         if start is None:
             return None
@@ -200,6 +214,16 @@ class Robot:
                 return None
         way = self.way(hand, start)
         return None if way is None else Descent(way, down)
+
+    def starts(self, hand: str) -> list[Joints]:
+        """Where inverse kinematics starts from: `rest`, and the same with an empty idle arm farther out,
+        where it leaves room."""
+        rest, other = self.rest(hand), _other(hand)
+        if other in self.grips:
+            return [rest]
+        aside = rest.copy()
+        aside[self.world.joint_names.index(f"{SIDES[other]}_shoulder_roll")] = ASIDE
+        return [rest, aside]
 
     def rest(self, hand: str) -> Joints:
         """The home posture; if the other arm carries something, it does so, and the torso with it; fingers as

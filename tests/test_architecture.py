@@ -9,6 +9,7 @@ import pytest
 import yaml
 
 from cognitive_arch import domain as domains
+from cognitive_arch import scenes
 from cognitive_arch.execution.environment import Outcome
 from cognitive_arch.execution.symbolic import SymbolicEnvironment
 from cognitive_arch.relational.parser import load_rules
@@ -17,7 +18,7 @@ from cognitive_arch.world.anchoring import WorldModel
 from tests.conftest import action, literals
 
 ROOT = Path(__file__).resolve().parents[1]
-FOUNDATION = {"errors", "resources", "shapes", "footprint", "domain", "random_scenes", "outside"}
+FOUNDATION = {"errors", "resources", "shapes", "footprint", "domain", "random_scenes", "scenes", "outside"}
 # Each package may import those named here, the foundation, and itself.
 ALLOWED = {
     "relational": set(),
@@ -74,9 +75,9 @@ def test_domains_load(name: str) -> None:
     assert {r.action for r in rules.rules} == set(domain.capabilities)
 
 
-@pytest.mark.parametrize("name", sorted(domains.scene_paths()))
+@pytest.mark.parametrize("name", sorted(scenes.scene_paths()))
 def test_scenes_load(name: str) -> None:
-    assert domains.load_scene(name).name == name
+    assert scenes.load_scene(name).name == name
 
 
 def plans(kind: str) -> list[dict[str, object]]:
@@ -88,7 +89,7 @@ def plans(kind: str) -> list[dict[str, object]]:
 
 
 def world_of(plan: dict[str, object]) -> SymbolicEnvironment:
-    scene = domains.load_scene(str(plan["scene"]))
+    scene = scenes.load_scene(str(plan["scene"]))
     domain = domains.load_domain(scene.domain)
     environment = SymbolicEnvironment(domain, scene, load_rules(domain.rules_path))
     environment.reset(0)

@@ -12,7 +12,9 @@ from cognitive_arch.demos import load_demos, read_demos
 from cognitive_arch.errors import ConfigError
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.runlog.store import RunStore
+from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.session import RunConfig, run_task
+from tests.sim.physics import check_physics
 
 SEEDS = range(10)
 DEMOS = load_demos()
@@ -109,6 +111,16 @@ def test_what_the_goal_can_do_without_is_not_missed(tmp_path: Path, seed: int) -
     assert "on(Ham,Bun-bottom)" in result["final_state"]
     assert told(steps, "outside") == ["Cheese was taken away"]
     assert told(steps, "creativity") == ["no plan for sub-goal 2: trying sub-goal 3 directly"]
+
+
+@pytest.mark.physics
+def test_out_of_reach_in_physics(tmp_path: Path) -> None:
+    """The complex scene from end to end; nothing sinks into anything, joints stay in their limits."""
+    result, _ = play("out-of-reach", tmp_path, backend="drake")
+    assert result["success"]
+    assert calls(result)[0].startswith("graspWith(Rake,")
+    assert {"on(Ham,Bun-bottom)", "on(Bun-top,Ham)"} <= set(result["final_state"])
+    check_physics(Trajectory.load(tmp_path / result["run_id"] / TRAJECTORY))
 
 
 @pytest.mark.physics

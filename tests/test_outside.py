@@ -9,10 +9,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from cognitive_arch.domain import load_domain, load_scene
+from cognitive_arch.domain import load_domain
 from cognitive_arch.errors import ConfigError
 from cognitive_arch.execution.placing import CLEARANCE, footprint, nearest_free
 from cognitive_arch.outside import PLACED, TABLE_X, TABLE_Y, Happening, OutsideEvent, Schedule, on_table, told
+from cognitive_arch.scenes import load_scene
 
 places = st.tuples(st.floats(*TABLE_X), st.floats(*TABLE_Y))
 names = st.sampled_from(sorted(load_domain("sandwich").objects))

@@ -9,13 +9,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from cognitive_arch.domain import domain_names, load_domain, load_scene
+from cognitive_arch.domain import domain_names, load_domain
 from cognitive_arch.errors import ConfigError
 from cognitive_arch.execution.backends import make_environment
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.footprint import footprint, smallest_gap
 from cognitive_arch.random_scenes import ROOM, random_scene
 from cognitive_arch.relational.parser import load_rules
+from cognitive_arch.scenes import load_scene
 
 EDGE_X, EDGE_Y = (-0.85, -0.15), (-0.45, 0.45)  # m, of the table in Drake
 

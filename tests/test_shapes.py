@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import TypeAdapter, ValidationError
 
-from cognitive_arch.domain import ObjectSpec, jittered, load_domain, load_scene
+from cognitive_arch.domain import ObjectSpec, jittered, load_domain
 from cognitive_arch.execution.placing import CLEARANCE, nearest_free
 from cognitive_arch.execution.placing import footprint as points
 from cognitive_arch.footprint import footprint, gap, outer_radius, smallest_gap
+from cognitive_arch.scenes import load_scene
 from cognitive_arch.shapes import Shape
 
 STUD = {"solid": {"type": "cylinder", "radius": 0.005, "height": 0.004}, "place": [0.02, 0.0], "above": 0.02}

@@ -22,7 +22,7 @@ def restoring(saved: Mapping[str, Any], kind: str, format_: int) -> Iterator[Non
         if found != (kind, format_):
             raise ValueError(f"it is of {found[0]}, format {found[1]}, not of {kind}, format {format_}")
         yield
-    except (KeyError, TypeError, ValueError, AttributeError, RecursionError) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, ArithmeticError, RuntimeError) as error:
         missing = "it lacks " if isinstance(error, KeyError) else ""
         raise StateError(f"this saved state does not fit: {missing}{one_line(error, 200)}") from None
 

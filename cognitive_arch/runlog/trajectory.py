@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 import zipfile
+import zlib
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any
@@ -80,7 +81,15 @@ class Trajectory:
             raise StoreError(
                 f"there is no trajectory at '{path}'; runs in Drake leave one unless --no-record is given"
             ) from None
-        except (OSError, EOFError, ValueError, KeyError, zipfile.BadZipFile) as error:
+        except (
+            OSError,
+            EOFError,
+            ValueError,
+            KeyError,
+            NotImplementedError,
+            zipfile.BadZipFile,
+            zlib.error,
+        ) as error:
             raise StoreError(f"cannot read the trajectory '{path}': {one_line(error, 200)}") from None
         for name in ("joint_names", "object_names", "labels"):
             arrays[name] = tuple(str(text) for text in arrays[name])

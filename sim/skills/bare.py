@@ -206,7 +206,7 @@ def sweep_object(
         return reason
     before = robot.world.pose(obj).translation()
     touched = _perform(robot, obj, hand, motion)
-    return _judge(robot, obj, before, towards, touched)
+    return judge(robot, obj, before, towards, touched)
 
 
 def _plan(
@@ -226,12 +226,11 @@ def _plan(
     # A hand whose tips must stay high to come down behind the object hardly gets hold of it.
     for sweep in sorted(free, key=lambda sweep: sweep.height)[:_TRIES]:
         motion = _solve(robot, obj, sweep)
-        if motion is not None:
+        if isinstance(motion, Motion):
             return motion, FailureReason.NONE
-    if free:
-        return None, FailureReason.OUT_OF_REACH
-    blocked = FailureReason.BLOCKED in reasons
-    return None, FailureReason.BLOCKED if blocked else FailureReason.OFF_TABLE
+        reasons.append(motion)
+    told = (FailureReason.BLOCKED, FailureReason.OUT_OF_REACH, FailureReason.OFF_TABLE)
+    return None, next(reason for reason in told if reason in reasons)
 
 
 def _sweeps(
@@ -314,7 +313,7 @@ def clear(
     return True
 
 
-def _solve(robot: Robot, obj: str, sweep: Sweep) -> Motion | None:
+def _solve(robot: Robot, obj: str, sweep: Sweep) -> Motion | FailureReason:
     hand, kinematics = sweep.stance.hand, robot.kinematics
     idle, rest = robot.idle_target(hand), robot.rest(hand)
     low = robot.scene.table.height + sweep.stance.radius + sweep.height
@@ -325,10 +324,10 @@ def _solve(robot: Robot, obj: str, sweep: Sweep) -> Motion | None:
     # Both ends are asked for first to give up early: sweeps that fail, fail there.
     for place in (sweep.end, sweep.start):
         if kinematics.solve(hand, at(place), rest, idle=idle, restarts=1) is None:
-            return None
+            return FailureReason.OUT_OF_REACH
     above = kinematics.solve(hand, at(sweep.start, LIFT), rest, idle=idle, accept=robot.clearance.free)
     if above is None:
-        return None
+        return FailureReason.OUT_OF_REACH
     length = math.dist(sweep.start, sweep.end)
     back = GAP / length
     # The hand leaves the object before it goes up: fingers bent behind it would lift its rim.
@@ -346,16 +345,16 @@ def _solve(robot: Robot, obj: str, sweep: Sweep) -> Motion | None:
     ):
         leg = kinematics.line(hand, begin, goal.p_WP, joints, idle=idle, pieces=pieces)
         if leg is None:
-            return None
+            return FailureReason.OUT_OF_REACH
         legs.append(leg)
         joints = leg[-1]
     down, along, back_off, up = legs
     away = [*back_off, *up]
     with robot.clearance.touching(hand, [obj]):
         if not robot.clearance.free_path([above, *down, *along, *away]):
-            return None
+            return FailureReason.BLOCKED
     way = robot.way(hand, above)
-    return None if way is None else Motion(way, down, along, away, max(0.5, length / SPEED))
+    return FailureReason.BLOCKED if way is None else Motion(way, down, along, away, max(0.5, length / SPEED))
 
 
 def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
@@ -375,7 +374,7 @@ def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
     return touched
 
 
-def _judge(robot: Robot, obj: str, before: Vector, towards: float, touched: bool) -> FailureReason:
+def judge(robot: Robot, obj: str, before: Vector, towards: float, touched: bool) -> FailureReason:
     """What the observed displacement says of a sweep."""
     if obj in robot.perception.observe().absent:
         return FailureReason.OFF_TABLE

@@ -22,7 +22,7 @@ PLACES = (np.arange(-0.24, -0.47, -0.04), np.arange(0.08, 0.30, 0.04))  # m, x a
 def drop(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
     name, hand = args
-    if robot.perception.held(hand) != name:
+    if robot.perception.held(hand) != name or hand not in robot.grips:
         return FailureReason.HAND_EMPTY
     reason = set_down(robot, hand, _targets(robot, name, hand))
     if reason is FailureReason.NONE and ("table", name) not in robot.world.contacts():

@@ -19,7 +19,7 @@ GAP = 0.002  # m left under the object when the hand opens
 def put_on(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
     name, target, hand = args
-    if robot.perception.held(hand) != name:
+    if robot.perception.held(hand) != name or hand not in robot.grips:
         return FailureReason.HAND_EMPTY
     if target in {robot.perception.held(h) for h in HANDS}:
         return FailureReason.HAND_BUSY

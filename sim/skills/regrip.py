@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from cognitive_arch.execution.environment import FailureReason
 from sim.kinematics import Vector
 from sim.robot import Robot
+from sim.skills.bare import judge
 from sim.skills.grasp import take
 from sim.skills.put import set_down
 from sim.skills.tool import HeldTool, Motion, Sweep, first_feasible, held_tool, lay_targets, perform
@@ -37,7 +38,11 @@ def sweep_with_tool(robot: Robot, tool: HeldTool, obj: str, error: Vector, sweep
             return reason
         regripped = held_tool(robot, tool.name, tool.hand)
         motion = plan(regripped) if regripped is not None else None
-    return FailureReason.OUT_OF_REACH if motion is None else perform(robot, tool, motion)
+    if motion is None:
+        return FailureReason.OUT_OF_REACH
+    before = robot.world.pose(obj).translation()
+    reason, touched = perform(robot, tool, obj, motion)
+    return reason if reason is not FailureReason.NONE else judge(robot, obj, before, motion.course, touched)
 
 
 def _regrip(robot: Robot, tool: HeldTool, plan: Callable[[HeldTool], Motion | None]) -> FailureReason:

@@ -56,10 +56,6 @@ class HeldTool:
         fingers = self.X_HT.inverse() @ np.array([0.02, 0.0, 0.0])
         return float(fingers[0] - self.p_TH[0])
 
-    def held_nearer(self, by: float) -> HeldTool:
-        """The same, held `by` metres nearer to its head."""
-        return replace(self, X_HT=self.X_HT @ RigidTransform([by, 0.0, 0.0]))
-
     def held_at(self, inset: float) -> HeldTool:
         """The same, held `inset` metres from the end of its handle."""
         by = self.shape.length - self.shape.width / 2 - inset - self.grip
@@ -137,13 +133,15 @@ class Sweep:
 
 @dataclass(frozen=True)
 class Motion:
-    """The way to above the start of a sweep and the waypoints down, along and up again."""
+    """The way to above the start of a sweep, the waypoints down, along and up again, and its direction
+    (radians)."""
 
     way: list[Joints]
     down: list[Joints]
     along: list[Joints]
     up: list[Joints]
     seconds: float
+    course: float
 
 
 def held_tool(robot: Robot, name: str, hand: str) -> HeldTool | None:
@@ -159,7 +157,7 @@ def held_tool(robot: Robot, name: str, hand: str) -> HeldTool | None:
 
 def unusable(robot: Robot, obj: str, tool: str, hand: str) -> FailureReason | None:
     """Why the tool in the hand cannot be used on the object, if so."""
-    if robot.perception.held(hand) != tool:
+    if robot.perception.held(hand) != tool or hand not in robot.grips:
         return FailureReason.HAND_EMPTY
     if obj in {robot.perception.held(h) for h in HANDS}:
         return FailureReason.HAND_BUSY
@@ -270,7 +268,8 @@ def _solve(robot: Robot, tool: HeldTool, obj: str, sweep: Sweep) -> Motion | Non
         return None
     down, along, up = pieces[0] + 1, pieces[0] + pieces[1] + 1, len(path)
     seconds = max(0.6, 0.95 * sweep.length / SPEED)
-    return Motion(way, path[1:down], path[down:along], path[along:up], seconds)
+    course = math.atan2(sweep.end[1] - sweep.start[1], sweep.end[0] - sweep.start[0])
+    return Motion(way, path[1:down], path[down:along], path[along:up], seconds, course)
 
 
 def _through(
@@ -279,7 +278,11 @@ def _through(
     """Joints at the first corner, and waypoints along straight lines from each to the next, in so many
     pieces."""
     kinematics, idle = robot.kinematics, robot.idle_target(hand)
-    joints = kinematics.solve(hand, corners[0], robot.rest(hand), idle=idle, accept=robot.clearance.free)
+    tried = (
+        kinematics.solve(hand, corners[0], start, idle=idle, accept=robot.clearance.free)
+        for start in robot.starts(hand)
+    )
+    joints = next((found for found in tried if found is not None), None)
     if joints is None:
         return None
     path = [joints]
@@ -291,20 +294,29 @@ def _through(
     return path
 
 
-def perform(robot: Robot, tool: HeldTool, motion: Motion) -> FailureReason:
-    """Carry out a sweep and take the tool aside again."""
+def perform(robot: Robot, tool: HeldTool, obj: str, motion: Motion) -> tuple[FailureReason, bool]:
+    """Carry out a sweep and take the tool aside again; says whether the tool was lost, and whether it ever
+    touched the object."""
+    touched = False
+
+    def watch() -> bool:
+        nonlocal touched
+        touched = touched or (tool.name, obj) in robot.world.contacts()
+        return False
+
     robot.go(motion.way)
     if robot.perception.held(tool.hand) != tool.name:
-        return _lost(robot, tool.hand)
+        return _lost(robot, tool.hand), touched
     robot.world.follow(motion.down, 1.0)
     robot.world.hold(0.1)
-    robot.world.follow(motion.along, motion.seconds)
+    robot.world.follow(motion.along, motion.seconds, watch)
     robot.world.hold(0.1)
     robot.world.follow(motion.up, 0.8)
     if robot.perception.held(tool.hand) != tool.name:
-        return _lost(robot, tool.hand)
+        return _lost(robot, tool.hand), touched
     carry_tool(robot, tool.hand, tool.name)
-    return FailureReason.NONE if robot.perception.held(tool.hand) == tool.name else FailureReason.SLIPPED
+    kept = robot.perception.held(tool.hand) == tool.name
+    return FailureReason.NONE if kept else FailureReason.SLIPPED, touched
 
 
 def _lost(robot: Robot, hand: str) -> FailureReason:

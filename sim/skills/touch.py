@@ -70,24 +70,27 @@ def _plan(
             blocked = True
             continue
         path = _solve(robot, obj, held, p_WT)
-        if path is not None:
+        if not isinstance(path, FailureReason):
             return path, FailureReason.NONE
+        blocked = blocked or path is FailureReason.BLOCKED
     return None, FailureReason.BLOCKED if blocked else FailureReason.OUT_OF_REACH
 
 
-def _solve(robot: Robot, obj: str, held: Stance, p_WT: Vector) -> tuple[list[Joints], Joints, Joints] | None:
+def _solve(
+    robot: Robot, obj: str, held: Stance, p_WT: Vector
+) -> tuple[list[Joints], Joints, Joints] | FailureReason:
     idle, joints = robot.idle_target(held.hand), robot.rest(held.hand)
     path = []
     for over in (ABOVE, SLOW, -DEEPEST):
         target = held.target(p_WT + np.array([0.0, 0.0, held.radius + over]))
         step = robot.kinematics.solve(held.hand, target, joints, idle=idle)
         if step is None:
-            return None
+            return FailureReason.OUT_OF_REACH
         path.append(step)
         joints = step
     above, near, end = path
     with robot.clearance.touching(held.hand, [obj]):
         if not robot.clearance.free_path(path):
-            return None
+            return FailureReason.BLOCKED
     way = robot.way(held.hand, above)
-    return None if way is None else (way, near, end)
+    return FailureReason.BLOCKED if way is None else (way, near, end)

@@ -9,13 +9,14 @@ from typing import Any
 
 import pytest
 
-from cognitive_arch.domain import Domain, load_domain, load_scene
+from cognitive_arch.domain import Domain, load_domain
 from cognitive_arch.errors import BackendError, StateError
 from cognitive_arch.execution.backends import BACKENDS, make_environment
 from cognitive_arch.execution.environment import Environment, FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.relational.parser import load_rules
+from cognitive_arch.scenes import load_scene
 from cognitive_arch.world.anchoring import WorldModel
 from tests.conftest import action
 

@@ -8,7 +8,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from cognitive_arch.domain import load_scene
 from cognitive_arch.execution.cycle import CycleSettings, EpisodeResult, PlanningCycle, Step
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
 from cognitive_arch.execution.explain import Attempts, EndReason
@@ -19,6 +18,7 @@ from cognitive_arch.planning.diagnosis import Verdict
 from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
 from cognitive_arch.relational.parser import parse_rules
 from cognitive_arch.relational.symbols import GroundAction
+from cognitive_arch.scenes import load_scene
 from cognitive_arch.session import RunConfig, Session, Setting
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import Observation

@@ -6,12 +6,13 @@ from typing import Any
 
 import pytest
 
-from cognitive_arch.domain import Domain, ReachLimits, load_scene
+from cognitive_arch.domain import Domain, ReachLimits
 from cognitive_arch.errors import ConfigError
 from cognitive_arch.execution.backends import make_environment
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.relational.rules import RuleSet
+from cognitive_arch.scenes import load_scene
 from cognitive_arch.session import RunConfig
 
 

@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from lark import Lark, logger
 
-from cognitive_arch.domain import load_domain, load_scene
+from cognitive_arch.domain import load_domain
 from cognitive_arch.errors import InstructionError
 from cognitive_arch.language.clauses import _Given, word_lists
 from cognitive_arch.language.instruction import (
@@ -28,6 +28,7 @@ from cognitive_arch.language.instruction import (
 )
 from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
 from cognitive_arch.resources import grammar_text
+from cognitive_arch.scenes import load_scene
 
 DOMAIN = load_domain("sandwich")
 KITCHEN = tuple(load_scene("kitchen").objects)

@@ -8,10 +8,11 @@ import pytest
 import yaml
 
 from cognitive_arch import resources
-from cognitive_arch.domain import load_domain, load_scene
+from cognitive_arch.domain import load_domain
 from cognitive_arch.errors import InstructionError
 from cognitive_arch.language.instruction import parse_instruction
 from cognitive_arch.language.semantic_memory import SemanticMemory
+from cognitive_arch.scenes import load_scene
 
 DOMAIN = load_domain("sandwich")
 

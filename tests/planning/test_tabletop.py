@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks.tabletop import GOALS, HANDS, tabletop
-from cognitive_arch.domain import Domain, load_scene
+from cognitive_arch.domain import Domain
 from cognitive_arch.execution.symbolic import SymbolicEnvironment
 from cognitive_arch.planning.base import PlanStatus
 from cognitive_arch.planning.guided import GuidedPrada
@@ -16,6 +16,7 @@ from cognitive_arch.planning.prada import Prada
 from cognitive_arch.relational.libprada import load_problem, write_problem
 from cognitive_arch.relational.rules import GroundRule, RuleSet
 from cognitive_arch.relational.symbols import Atom, GroundAction, Literal
+from cognitive_arch.scenes import load_scene
 from cognitive_arch.world.anchoring import WorldModel
 
 Canonical = tuple[GroundAction, frozenset[Literal], tuple[tuple[float, frozenset[Literal]], ...]]

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cognitive_arch.domain import Domain, ObjectSpec, Placement, Scene, load_domain, load_scene
+from cognitive_arch.domain import Domain, ObjectSpec, Placement, Scene, load_domain
 from cognitive_arch.execution.environment import FailureReason, Outcome
+from cognitive_arch.scenes import load_scene
 from cognitive_arch.session import RunConfig, run_task
 from sim.environment import DrakeEnvironment
 from sim.kinematics import DOWN, HandTarget, fingertip, palm_axis
@@ -59,8 +60,11 @@ def test_only_what_may_be_touched_may_be_touched(simple: DrakeEnvironment) -> No
     with robot.clearance.touching("RightHand", ["Ham"]):
         assert robot.clearance.free(into)
     assert not robot.clearance.free(into)
-    with robot.clearance.leaving(into):
-        assert robot.clearance.free_path([into, robot.world.home])
+    assert not robot.clearance.free_path([into, robot.world.home])
+    raised = robot.kinematics.solve("RightHand", robot.kinematics.raised("RightHand", into, 0.12), into)
+    assert raised is not None
+    assert robot.clearance.free_from(into, [raised, robot.world.home])
+    assert not robot.clearance.free_from(into, [raised, into, raised])  # once away, it counts
 
 
 def test_arms_keep_clear_of_each_other_and_of_the_trunk(simple: DrakeEnvironment) -> None:

@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from cognitive_arch.domain import Domain, load_scene
+from cognitive_arch.domain import Domain
 from cognitive_arch.errors import StateError
 from cognitive_arch.execution.backends import make_environment
 from cognitive_arch.execution.environment import FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.relational.rules import RuleSet
+from cognitive_arch.scenes import load_scene
 from sim.environment import DrakeEnvironment
 from sim.hands import FINGER_FRICTION, finger_names
 from sim.noise import (

@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cognitive_arch.domain import Domain, ObjectSpec, load_scene
+from cognitive_arch.domain import Domain, ObjectSpec
 from cognitive_arch.errors import BackendError
+from cognitive_arch.scenes import load_scene
 from sim import pictures
 from sim.assets import robot_urdf, roll_pitch_yaw, rotation
 from sim.environment import DrakeEnvironment

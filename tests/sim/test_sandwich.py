@@ -16,11 +16,12 @@ import pytest
 from PIL import Image
 from pydrake.math import RigidTransform
 
-from cognitive_arch.domain import Domain, load_scene
+from cognitive_arch.domain import Domain
 from cognitive_arch.errors import StoreError
 from cognitive_arch.execution.environment import FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.runlog.trajectory import Trajectory
+from cognitive_arch.scenes import load_scene
 from cognitive_arch.session import Progress, RunConfig, resume_task, run_task
 from sim.environment import DrakeEnvironment
 from sim.pictures import Stage, write_video
@@ -154,7 +155,7 @@ def test_noise_makes_an_arm_miss_and_the_robot_finds_another_way(tmp_path: Path)
     failed = [a for a in result["actions"] if a["outcome"] == "failure"]
     assert failed
     assert {a["reason"] for a in failed} <= {
-        "not_grasped", "slipped", "misplaced", "out_of_reach", "unexpected_effect", "no_effect",
+        "not_grasped", "slipped", "misplaced", "out_of_reach", "blocked", "unexpected_effect", "no_effect",
     }  # fmt: skip
 
 

@@ -7,8 +7,9 @@ import math
 import numpy as np
 import pytest
 
-from cognitive_arch.domain import Domain, Scene, jittered, load_scene
+from cognitive_arch.domain import Domain, Scene, jittered
 from cognitive_arch.execution.environment import FailureReason, Outcome
+from cognitive_arch.scenes import load_scene
 from sim.environment import DrakeEnvironment
 from sim.footprint import Capsule, disc, gap, smallest_gap, tool_footprint
 from sim.trials import mirrored

@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 from pydrake.multibody.math import SpatialVelocity
 
-from cognitive_arch.domain import Domain, load_domain, load_scene
+from cognitive_arch.domain import Domain, load_domain
 from cognitive_arch.execution.environment import FailureReason, Outcome
+from cognitive_arch.scenes import load_scene
 from sim.environment import DrakeEnvironment
 from sim.scenario import ROLLING_TIME, object_inertia, rolling_damping
 from sim.world import World
