@@ -43,14 +43,22 @@ def row(what: str, hand: str, seeds: int | None, jitter: float | None, pool: Exe
             print(f"    seed {seed}: {', '.join(trial.said)}", flush=True)
 
 
+def positive(text: str) -> int:
+    """A whole number from 1."""
+    number = int(text)
+    if number < 1:
+        raise ValueError(f"{number} is not positive")
+    return number
+
+
 def main(arguments: Sequence[str] | None = None) -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0] if __doc__ else None)
     parser.add_argument("--what", help=f"a comma list of {', '.join(TRIALS)}")
     parser.add_argument("--hand", choices=["left", "right", "both"], default="both")
-    parser.add_argument("--seeds", type=int, help="trials per row; else as the row wants")
+    parser.add_argument("--seeds", type=positive, help="trials per row; else as the row wants")
     parser.add_argument("--jitter", type=float, help="metres; else as the row wants")
-    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--jobs", type=positive, default=1)
     options = parser.parse_args(arguments)
     names = options.what.split(",") if options.what else list(TRIALS)
     for name in names:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import platform
 import subprocess
 from importlib import metadata
@@ -80,17 +81,21 @@ def versions() -> dict[str, str]:
 
 
 def _git_commit() -> str:
+    """The commit; of a checkout with changes also a digest of these, so that no two of them look alike."""
     root = Path(__file__).resolve().parents[2]
     if not (root / ".git").exists():
         return "none"
     try:
-        out = subprocess.run(
-            ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=12"],
-            capture_output=True,
-            text=True,
-            timeout=5,
-            check=True,
-        )
+        commit = _git(root, "describe", "--always", "--dirty", "--abbrev=12")
+        if not commit.endswith("-dirty"):
+            return commit
+        return f"{commit}-{hashlib.sha256(_git(root, 'diff', 'HEAD').encode()).hexdigest()[:8]}"
     except (OSError, subprocess.SubprocessError):
         return "unknown"
+
+
+def _git(root: Path, *args: str) -> str:
+    """What git says of the checkout."""
+    command = ["git", "-C", str(root), *args]
+    out = subprocess.run(command, capture_output=True, text=True, errors="replace", timeout=5, check=True)
     return out.stdout.strip()

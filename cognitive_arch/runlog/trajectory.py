@@ -1,8 +1,8 @@
 """What moved how during a run: `trajectory.npz` in the run's folder, and its reader.
 
 The simulator samples at every command tick and keeps every fourth sample; what can be deep or far for a
-moment only (overlaps, joints beyond their limits) is the maximum since the sample before, so that thinning
-hides nothing.
+moment only (overlaps, joints beyond their limits) is the maximum since the sample before. Joints are read
+at every tick, overlaps at every third (60 ms), or every fourth while nothing moves.
 """
 
 from __future__ import annotations

@@ -16,6 +16,7 @@ from sim.kinematics import DOWN, HandTarget, Kinematics, fingertip, palm_axis
 from sim.skills.bare import stance
 from sim.trials import TAPPED, bare_scene, use_hand
 from tests.conftest import action
+from tests.sim.physics import check_physics
 
 HANDS = ("LeftHand", "RightHand")
 
@@ -140,8 +141,10 @@ def test_refusals_move_nothing(crowded: DrakeEnvironment, call: str, reason: Fai
 def test_what_a_bare_hand_does(domain: Domain, what: str, hand: str, posture: Posture) -> None:
     """It moves the object the right way (or not at all), and nothing else."""
     environment = DrakeEnvironment(domain, bare_scene("Bun-bottom", hand), jitter=0.02)
+    environment.recorder.keep = True
     trial = use_hand(environment, what, posture, "Bun-bottom", hand, 0)
     assert trial.ok, trial.said
+    check_physics(environment.recorder.trajectory())
 
 
 @pytest.mark.physics
