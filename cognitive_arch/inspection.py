@@ -84,7 +84,7 @@ def _run(run: Run, steps: list[dict[str, Any]], format_: str) -> View:
 
 def _ending(run: Run, steps: list[dict[str, Any]]) -> str:
     if run.result is None:
-        ending = f"{run.status} after {len(steps)} finished steps"
+        ending = f"{run.status} after {len(steps)} finished step{'' if len(steps) == 1 else 's'}"
         if run.status is RunStatus.INTERRUPTED:
             ending += f"; go on with: {resume_command(run.run_id, run.folder.parent)}"
         return ending

@@ -168,8 +168,9 @@ class Recorder:
 
     @staticmethod
     def _pose(positions: Joints, start: int) -> Joints:
-        """x, y, z and quaternion; the plant has the quaternion first."""
-        return np.concatenate([positions[start + 4 : start + 7], positions[start : start + 4]])
+        """x, y, z and unit quaternion; the plant has the quaternion first, and lets its length drift."""
+        quaternion = positions[start : start + 4]
+        return np.concatenate([positions[start + 4 : start + 7], quaternion / np.linalg.norm(quaternion)])
 
     def trajectory(self) -> Trajectory:
         """All that was kept."""

@@ -7,7 +7,10 @@ from collections.abc import Callable
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.world.observation import HANDS
+from sim.hands import STROKE
 from sim.robot import Robot
+
+STUCK = 0.5  # s in which what is stuck falls out of an open hand
 
 Skill = Callable[[Robot, tuple[str, ...]], FailureReason]
 """Moves the robot; returns `NONE` if the motion was carried out, else what was in the way or went wrong.
@@ -24,10 +27,17 @@ def unusable_arguments(robot: Robot, action: GroundAction) -> FailureReason | No
 
 
 def let_go_of_lost(robot: Robot) -> None:
-    """Open and bring home every hand whose object has slipped away since it was grasped.
+    """Open and bring home every hand whose object has slipped away since it was grasped, or is stuck
+    between the pads though it was let go.
 
-    Otherwise the arm would go on being kept level for something it no longer carries.
+    Otherwise the arm would go on being kept level for something it no longer carries, or no skill could use
+    the hand again.
     """
+    for hand in HANDS:
+        if hand not in robot.grips and robot.perception.held(hand) is not None:
+            release(robot, hand, STROKE)
+            robot.world.hold(STUCK)
+            robot.go_home(hand)
     for hand in sorted(robot.grips):
         if robot.perception.held(hand) is None:
             release(robot, hand, robot.grips[hand].opening)

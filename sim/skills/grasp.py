@@ -7,8 +7,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cognitive_arch.execution.environment import FailureReason
+from cognitive_arch.shapes import Shape
 from cognitive_arch.world.observation import HANDS
 from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, HANDLE, STROKE, Posture
 from sim.kinematics import DOWN, HandTarget, Vector, palm_axis
@@ -22,8 +24,8 @@ DEPTH = 0.048  # m of an object that fit between the fingers: what is taller wou
 MARGIN = 0.015  # m between each open finger and the object
 SQUEEZE = 0.010  # m that the closing fingers are commanded into the object
 FIRM_SQUEEZE = 0.025  # m into a tool: enough for all the force the fingers have
-CARRY = {"LeftHand": (-0.24, -0.17), "RightHand": (-0.24, 0.17)}  # m, where a full hand waits
-CARRY_HEIGHT = 0.17  # m above the table
+CARRY = {"LeftHand": (-0.26, -0.17), "RightHand": (-0.26, 0.17)}  # m, where a full hand waits
+CARRY_HEIGHT = 0.14  # m above the table: from higher up, a slice that slips may roll off it
 
 
 def grasp(robot: Robot, args: tuple[str, ...]) -> FailureReason:
@@ -175,10 +177,22 @@ def carry(robot: Robot, hand: str) -> None:
     robot.grips[hand].carrying = robot.world.command
 
 
+def _up(shape: Shape, X_WO: RigidTransform) -> Vector:
+    """The axis of an object that is to point up when it is put down; of what can lie on any side, the one
+    that does so now."""
+    if shape.type in ("cylinder", "tool"):
+        return np.array([0.0, 0.0, 1.0])
+    heights = X_WO.rotation().matrix()[2]
+    axis = int(np.abs(heights).argmax())
+    up: Vector = np.sign(heights[axis]) * np.eye(3)[axis]
+    return up
+
+
 def object_target(robot: Robot, hand: str, p_WO: Vector, fingers_W: Vector | None) -> HandTarget:
     """The hand pose that brings what it holds to `p_WO` (its centre, metres), lying level."""
     name = robot.perception.held(hand)
     assert name is not None
-    X_HO = robot.world.hand_pose(hand).inverse() @ robot.world.pose(name)
-    up_H = X_HO.rotation().matrix()[:, 2]
+    X_WO = robot.world.pose(name)
+    X_HO = robot.world.hand_pose(hand).inverse() @ X_WO
+    up_H = X_HO.rotation().matrix() @ _up(robot.domain.objects[name].shape, X_WO)
     return HandTarget(X_HO.translation(), p_WO, up_H, np.array([0.0, 0.0, 1.0]), 0.03, fingers_W)
