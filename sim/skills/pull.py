@@ -19,10 +19,8 @@ from sim.skills.tool import (
     HeldTool,
     Sweep,
     discomfort,
-    held_tool,
     is_free,
     obstacles,
-    unusable,
 )
 
 BEHIND = 0.015  # m between the bar and the object when the tool comes down
@@ -38,14 +36,7 @@ BEST_X = -0.40  # m
 
 def pull(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
-    obj, name, hand = args
-    reason = unusable(robot, obj, name, hand)
-    if reason is not None:
-        return reason
-    tool = held_tool(robot, name, hand)
-    if tool is None or tool.shape.bar <= 0:
-        return FailureReason.CANNOT_PULL
-    return sweep_with_tool(robot, tool, obj, robot.noise.head("pull"), _sweeps)
+    return sweep_with_tool(robot, args, "pull", _sweeps, with_bar=True)
 
 
 def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:

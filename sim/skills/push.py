@@ -17,10 +17,8 @@ from sim.skills.tool import (
     HeldTool,
     Sweep,
     discomfort,
-    held_tool,
     is_free,
     obstacles,
-    unusable,
 )
 
 BEFORE = 0.015  # m between the head and the object when the tool comes down
@@ -33,14 +31,7 @@ ROOM = 0.01  # m around the object where it ends up
 
 def push(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`."""
-    obj, name, hand = args
-    reason = unusable(robot, obj, name, hand)
-    if reason is not None:
-        return reason
-    tool = held_tool(robot, name, hand)
-    if tool is None:
-        return FailureReason.NOT_A_TOOL
-    return sweep_with_tool(robot, tool, obj, robot.noise.head("push"), _sweeps)
+    return sweep_with_tool(robot, args, "push", _sweeps)
 
 
 def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:

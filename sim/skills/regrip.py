@@ -6,12 +6,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 
 from cognitive_arch.execution.environment import FailureReason
-from sim.kinematics import Vector
 from sim.robot import Robot
 from sim.skills.bare import judge
 from sim.skills.grasp import take
 from sim.skills.put import set_down
-from sim.skills.tool import HeldTool, Motion, Sweep, first_feasible, held_tool, lay_targets, perform
+from sim.skills.tool import HeldTool, Motion, Sweep, first_feasible, held_tool, lay_targets, perform, unusable
 
 INSETS = (0.03, 0.08, 0.12)  # m from the end of the handle
 SAME = 0.02  # m; another grip is not worth while that near to the present one
@@ -19,11 +18,21 @@ SAME = 0.02  # m; another grip is not worth while that near to the present one
 Sweeps = Callable[[Robot, HeldTool, str], Iterator[Sweep]]
 
 
-def sweep_with_tool(robot: Robot, tool: HeldTool, obj: str, error: Vector, sweeps: Sweeps) -> FailureReason:
-    """Carry out the first of the sweeps of `obj` that the arm can do, if need be with another grip.
-
-    The robot believes the tool's head to be off by `error` (metres).
-    """
+def sweep_with_tool(
+    robot: Robot, args: tuple[str, ...], verb: str, sweeps: Sweeps, *, with_bar: bool = False
+) -> FailureReason:
+    """Move an object with the tool in the hand: the first of the sweeps that the arm can do, if need be with
+    another grip; `verb` is the capability whose noise applies."""
+    obj, name, hand = args
+    reason = unusable(robot, obj, name, hand)
+    if reason is not None:
+        return reason
+    tool = held_tool(robot, name, hand)
+    if with_bar and (tool is None or tool.shape.bar <= 0):
+        return FailureReason.CANNOT_PULL
+    if tool is None:
+        return FailureReason.NOT_A_TOOL
+    error = robot.noise.head(verb)  # the robot believes the head to be that far off
 
     def plan(tool: HeldTool) -> Motion | None:
         believed = tool.with_head_off(error)
