@@ -6,7 +6,6 @@ Heavy imports stay inside the commands, so that `--help` is quick.
 from __future__ import annotations
 
 import io
-import json
 import os
 import sys
 from collections.abc import Callable
@@ -17,6 +16,15 @@ import typer
 
 from cognitive_arch import __version__
 from cognitive_arch.errors import CogArchError, ConfigError, one_line
+from cognitive_arch.verbs.common import (
+    Json,
+    PlannerOption,
+    RulesOption,
+    SceneOption,
+    SeedOption,
+    StoreOption,
+    print_answer,
+)
 
 if TYPE_CHECKING:
     from cognitive_arch.session import Progress
@@ -32,23 +40,6 @@ app = typer.Typer(
     help="Give a simulated iCub a sentence, watch it plan and act, and see why it did each thing.",
 )
 
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON object on stdout and nothing else there.")]
-SceneOption = Annotated[
-    str,
-    typer.Option(
-        "--scene", help="A scene's name, random:SEED[:DOMAIN[:NUMBER]], or the path of a scene file."
-    ),
-]
-RulesOption = Annotated[
-    str | None, typer.Option("--rules", help="A rules file to use instead of the domain's own.")
-]
-StoreOption = Annotated[
-    Path, typer.Option("--store", envvar="COGARCH_STORE", help="Folder where runs are kept.")
-]
-PlannerOption = Annotated[
-    str, typer.Option(help="guided-prada, a-prada, prada, uct, sst, or one that another package adds.")
-]
-SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
 RecordOption = Annotated[
     bool, typer.Option("--record/--no-record", help="Keep a Meshcat recording and pictures (drake).")
 ]
@@ -87,7 +78,7 @@ def parse(
     from cognitive_arch.session import Setting
 
     task = Setting.load(scene, rules).understand(sentence)
-    _print(task.to_json(), report.task_text(task), as_json)
+    print_answer(task.to_json(), report.task_text(task), as_json)
 
 
 @app.command()
@@ -179,7 +170,7 @@ def _carry_out(work: Callable[[Progress], dict[str, Any]], store: Path, as_json:
     except RunInterrupted as stopped:
         command = report.resume_command(stopped.run_id, store)
         raise _Stopped(f"finished steps are kept, go on with: {command}") from None
-    _print(result, report.result_text(result), as_json)
+    print_answer(result, report.result_text(result), as_json)
     if not result["success"]:
         raise typer.Exit(1)
 
@@ -203,10 +194,10 @@ def demo(
 
     demos = load_demos()
     if name is None:
-        return _print(demos.to_json(), str(demos), as_json)
+        return print_answer(demos.to_json(), str(demos), as_json)
     chosen = demos.find(name)
     config = chosen.config(backend, seed, record, video)
-    _print({}, "" if as_json else report.demo_text(chosen, config), False)
+    print_answer({}, "" if as_json else report.demo_text(chosen, config), False)
 
     def work(progress: Progress) -> dict[str, Any]:
         return {"demo": name} | run_task(chosen.sentence, config, store, progress)
@@ -253,7 +244,7 @@ def plan(
         answer = dry_run.plan_once(load, settings, report.notice)
     else:
         answer = dry_run.evaluate_given(load, actions, settings)
-    _print(answer, dry_run.plan_text(answer), as_json)
+    print_answer(answer, dry_run.plan_text(answer), as_json)
     if answer.get("status") == "no_plan" and answer["diagnosis"]["verdict"] != "holds":
         raise typer.Exit(1)
 
@@ -278,21 +269,11 @@ def inspect(
         if run_id is None or step is not None or format_ != "text":
             raise ConfigError("--video needs a run (or 'latest'), and goes without --step and --format")
         made = film(run_id, store, video)
-        return _print(made, f"wrote {made['video']}", as_json)
+        return print_answer(made, f"wrote {made['video']}", as_json)
     from cognitive_arch import inspection
 
     view = inspection.view(store, run_id, step, format_)
-    _print(view.data, view.text, as_json)
-
-
-def _print(data: dict[str, Any], text: str, as_json: bool) -> None:
-    shown = json.dumps(data, sort_keys=False, allow_nan=False) if as_json else text
-    try:
-        if shown:
-            print(shown, flush=True)
-    except BrokenPipeError:
-        # The reader went away (cogarch inspect | head); nothing is wrong with what was done.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    print_answer(view.data, view.text, as_json)
 
 
 def main() -> None:
