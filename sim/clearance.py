@@ -81,10 +81,17 @@ class Clearance:
         self._checker.SetCollisionFilterMatrix(matrix)
         return changed
 
-    def look(self, held: Mapping[str, tuple[str, RigidTransform]]) -> None:
-        """Take in where everything is; `held` maps hands to what they hold and its pose in the hand frame."""
+    def look(
+        self, poses: Mapping[str, RigidTransform], held: Mapping[str, tuple[str, RigidTransform]]
+    ) -> None:
+        """Take in where everything is: `poses` (X_WO) are all that counts as there; `held` maps hands to
+        what they hold and its pose in the hand frame."""
         world, checker = self._world, self._checker
         self._base = world.configuration(world.command)
+        for name, body in self._objects.items():
+            start, X_WO = body.floating_positions_start(), poses.get(name, RigidTransform(PARK))
+            self._base[start : start + 4] = X_WO.rotation().ToQuaternion().wxyz()
+            self._base[start + 4 : start + 7] = X_WO.translation()
         for hand in HANDS:
             checker.RemoveAllAddedCollisionShapes(hand)
         for hand, (name, X_HO) in held.items():

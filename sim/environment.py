@@ -20,6 +20,7 @@ from sim.hands import Posture
 from sim.kinematics import Kinematics
 from sim.meddling import disturb
 from sim.noise import EpisodeNoise, PhysicalNoise
+from sim.perception import OraclePerception
 from sim.pictures import LARGE, SMALL, Stage, View, save_picture, write_recording, write_video
 from sim.recorder import Recorder
 from sim.robot import Robot
@@ -29,7 +30,7 @@ from sim.skills.base import let_go_of_lost, unusable_arguments
 from sim.world import World
 
 SETTLE = 0.3  # s before the first look
-FORMAT = 1  # of saved states
+FORMAT = 2  # of saved states
 ARTIFACTS = (".png", ".npz", ".html", ".mp4")
 
 
@@ -89,6 +90,7 @@ class DrakeEnvironment:
 
     def _new_robot(self, rng: np.random.Generator) -> Robot:
         noise = EpisodeNoise(self._noise, self.world, rng)
+        truth = OraclePerception(self.world, self._kinematics, self._reach)
         return Robot(
             self._domain,
             self._scene,
@@ -97,7 +99,8 @@ class DrakeEnvironment:
             rng,
             self._kinematics,
             self._clearance,
-            reach=self._reach,
+            perception=truth,
+            truth=truth,
         )
 
     def observe(self) -> Observation:
@@ -115,15 +118,18 @@ class DrakeEnvironment:
             return SkillResult(Outcome.FAILURE, wrong or FailureReason.UNKNOWN_OBJECT)
         let_go_of_lost(self.robot)
         started, name = self.world.time, action.args[0]
-        before = self.world.pose(name).translation()
+        perception = self.robot.perception
+        before = perception.pose(name).translation()
         hand = action.args[-1]
-        held = self.robot.perception.held(hand)
+        held = perception.held(hand)
         self.recorder.begin(str(action))
         self.robot.measured.clear()
         reason = perform(self.robot, action.args)
-        moved = self.world.pose(name).translation() - before
-        effect = {f"displacement_{axis}": float(d) for axis, d in zip("xyz", moved, strict=True)}
-        effect["duration"] = self.world.time - started
+        effect = {"duration": self.world.time - started}
+        perception.look()
+        if name in perception.names():
+            moved = perception.pose(name).translation() - before
+            effect |= {f"displacement_{axis}": float(d) for axis, d in zip("xyz", moved, strict=True)}
         effect |= self.recorder.measured(hand, held, name) | self.robot.measured
         self.recorder.begin()
         outcome = Outcome.SUCCESS if reason is FailureReason.NONE else Outcome.FAILURE

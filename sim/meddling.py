@@ -38,9 +38,9 @@ def _touched(robot: Robot, event: OutsideEvent) -> tuple[str, ...]:
     """The objects that an event changes, from the bottom up."""
     name = event.name
     if event.kind is Happening.EMPTY:
-        held = robot.perception.held(name) if name in robot.grips else None
+        held = robot.truth.held(name) if name in robot.grips else None
         return (held,) if held else ()
-    there = {obj.name for obj in robot.perception.observe().objects}
+    there = set(robot.truth.names())
     if event.kind is Happening.ADD:
         return (name,) if name in set(robot.world.scenario.objects) - there else ()
     if name not in there:
@@ -48,7 +48,7 @@ def _touched(robot: Robot, event: OutsideEvent) -> tuple[str, ...]:
     if event.kind is not Happening.TOPPLE:
         return (name,)
     above = _above(robot, name)
-    return (name, *above) if robot.perception.supports(name) else above
+    return (name, *above) if robot.truth.supports(name) else above
 
 
 def _above(robot: Robot, name: str) -> tuple[str, ...]:
@@ -56,7 +56,7 @@ def _above(robot: Robot, name: str) -> tuple[str, ...]:
     found: list[str] = []
     queue = [name]
     while queue:
-        new = [other for other in robot.perception.covered_by(queue.pop(0)) if other not in found]
+        new = [other for other in robot.truth.covered_by(queue.pop(0)) if other not in found]
         found += new
         queue += new
     return tuple(sorted(found, key=robot.top_of))
@@ -66,12 +66,12 @@ def _lay(robot: Robot, name: str, wanted: Place, above: float, ignoring: tuple[s
     """Put an object flat on the free place of the table nearest to `wanted`, `above` metres over it."""
     world = robot.world
     shape = robot.domain.objects[name].shape
-    seen = [obj for obj in robot.perception.observe().objects if obj.name not in (name, *ignoring)]
-    lying = [obj for obj in seen if obj.name not in {robot.perception.held(hand) for hand in robot.grips}]
+    held = {robot.truth.held(hand) for hand in robot.grips}
+    lying = [other for other in robot.truth.names() if other not in {name, *ignoring, *held}]
     others = [
-        (obj.position[0] + x, obj.position[1] + y)
-        for obj in lying
-        for x, y in footprint(robot.domain.objects[obj.name].shape, obj.yaw)
+        (robot.truth.place(other)[0] + x, robot.truth.place(other)[1] + y)
+        for other in lying
+        for x, y in footprint(robot.domain.objects[other].shape, robot.truth.place(other)[2])
     ]
     yaw = float(world.pose(name).rotation().ToRollPitchYaw().yaw_angle())
     x, y = nearest_free(wanted, others, footprint(shape, yaw))

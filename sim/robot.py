@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cognitive_arch.domain import Domain, ReachLimits, Scene
+from cognitive_arch.domain import Domain, Scene
 from cognitive_arch.world.observation import HANDS
 from sim.clearance import Clearance
 from sim.hands import SIDES, Posture, is_hand_joint
@@ -25,7 +25,7 @@ from sim.kinematics import (
     palm_axis,
 )
 from sim.noise import EpisodeNoise
-from sim.perception import OraclePerception
+from sim.perception import OraclePerception, Perception
 from sim.world import Joints, World
 
 LEVEL, TILTS = 0.03, (0.05, 0.15, 0.30)  # rad
@@ -77,9 +77,9 @@ def _other(hand: str) -> str:
 
 @dataclass
 class Robot:
-    """The iCub as skills see it. `grips` says how each full hand holds what it holds, `postures` what the
-    fingers of each hand do, `measured` what the skill at work has measured (SI units);
-    `reach` are constants that perception tells reach by, None for the arms' kinematics."""
+    """The iCub as skills see it. `perception` is all that they know of things; `truth` is for whoever plays
+    the world or judges the robot. `grips` says how each full hand holds what it holds, `postures` what the
+    fingers of each hand do, `measured` what the skill at work has measured (SI units)."""
 
     domain: Domain
     scene: Scene
@@ -88,20 +88,21 @@ class Robot:
     rng: np.random.Generator
     kinematics: Kinematics
     clearance: Clearance
+    perception: Perception
+    truth: OraclePerception
     grips: dict[str, Grip] = field(default_factory=dict)
-    reach: ReachLimits | None = None
     postures: dict[str, Posture] = field(default_factory=lambda: dict.fromkeys(HANDS, Posture.STRAIGHT))
     measured: dict[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         self._hand_joints = np.array([is_hand_joint(name) for name in self.world.joint_names])
-        self.perception = OraclePerception(self.world, self.kinematics, self.reach)
 
     def save(self) -> dict[str, Any]:
         """What the robot remembers from one action to the next, as plain data."""
         return {
             "grips": {hand: grip.to_json() for hand, grip in sorted(self.grips.items())},
             "noise": self.noise.save(),
+            "perception": self.perception.save(),
             "postures": {hand: str(posture) for hand, posture in sorted(self.postures.items())},
         }
 
@@ -112,6 +113,7 @@ class Robot:
             raise ValueError("its grips are of other joints")
         self.grips = grips
         self.noise.restore(saved["noise"])
+        self.perception.restore(saved["perception"])
         self.postures = {hand: Posture(saved["postures"][hand]) for hand in HANDS}
 
     def set_posture(self, hand: str, posture: Posture) -> None:
@@ -124,7 +126,7 @@ class Robot:
 
     def top_of(self, name: str) -> float:
         """Height of an object's upper face, metres."""
-        return float(self.world.pose(name).translation()[2] + self.world.height(name) / 2)
+        return float(self.perception.pose(name).translation()[2] + self.world.height(name) / 2)
 
     def look(self, supposed: Mapping[str, tuple[str, RigidTransform]] | None = None) -> None:
         """Take in what is in the way now, before a motion is planned.
@@ -135,8 +137,9 @@ class Robot:
         for hand in HANDS:
             name = self.perception.held(hand)
             if name is not None:
-                held[hand] = (name, self.world.hand_pose(hand).inverse() @ self.world.pose(name))
-        self.clearance.look(held | dict(supposed or {}))
+                held[hand] = (name, self.world.hand_pose(hand).inverse() @ self.perception.pose(name))
+        poses = {name: self.perception.pose(name) for name in self.perception.names()}
+        self.clearance.look(poses, held | dict(supposed or {}))
 
     def way(self, hand: str, joints: Joints) -> list[Joints] | None:
         """Waypoints of a collision-free way of `hand` to `joints`, or None; as seen by the last `look`.

@@ -89,7 +89,7 @@ def grasp_trial(hand: str, seed: int, jitter: float) -> Trial:
     world.reset(seed)
     said = do(world, ("graspWith", "Ham", name))
     world.settle(1.0)
-    return Trial(world.robot.perception.held(name) == "Ham", tuple(said))
+    return Trial(world.robot.truth.held(name) == "Ham", tuple(said))
 
 
 def put_trial(hand: str, seed: int, jitter: float) -> Trial:
@@ -98,7 +98,7 @@ def put_trial(hand: str, seed: int, jitter: float) -> Trial:
     world.reset(seed)
     said = do(world, ("graspWith", "Ham", name), ("putOnWith", "Ham", "Bun-bottom", name))
     world.settle(1.0)
-    return Trial("Bun-bottom" in world.robot.perception.supports("Ham"), tuple(said))
+    return Trial("Bun-bottom" in world.robot.truth.supports("Ham"), tuple(said))
 
 
 def drop_trial(hand: str, seed: int, jitter: float) -> Trial:
@@ -126,7 +126,7 @@ def tool_trial(verb: str, tool: str, obj: str, hand: str, seed: int, jitter: flo
     before = world.world.pose(obj).translation()[0]
     said += do(world, (verb, obj, tool, name))
     moved = (world.world.pose(obj).translation()[0] - before) * (1 if verb == "pull" else -1)
-    kept = world.robot.perception.held(name) == tool
+    kept = world.robot.truth.held(name) == tool
     said += [f"{100 * moved:.1f} cm", "kept" if kept else "tool lost"]
     return Trial(moved >= MOVED and kept, tuple(said), 100 * moved)
 

@@ -22,7 +22,6 @@ from sim.hands import (
     Posture,
     carriage_name,
     finger_names,
-    hand_links,
     knuckle_names,
 )
 from sim.scenario import FRICTION, Scenario, build_scenario, resist_rolling
@@ -175,11 +174,6 @@ class World:
                 a, b = (self.plant.get_body(k).name() for k in (info.bodyA_index(), info.bodyB_index()))
                 pairs.update({(a, b), (b, a)})
         return frozenset(pairs)
-
-    def hand_touches(self, hand: str, name: str) -> bool:
-        """Whether some part of the hand presses on an object now."""
-        links = hand_links(SIDES[hand])
-        return any(a in links and b == name for a, b in self.contacts())
 
     # -- keeping ------------------------------------------------------------------------------------
 

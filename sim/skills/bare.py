@@ -204,7 +204,7 @@ def sweep_object(
     motion, reason = _plan(robot, obj, hand, towards, stances)
     if motion is None:
         return reason
-    before = robot.world.pose(obj).translation()
+    before = robot.perception.pose(obj).translation()
     touched = _perform(robot, obj, hand, motion)
     return judge(robot, obj, before, towards, touched)
 
@@ -242,7 +242,7 @@ def _sweeps(
     aim: Vector,
 ) -> Iterator[Sweep]:
     """Ways to sweep the object, the straightest first."""
-    believed = RigidTransform(aim) @ robot.world.pose(obj)
+    believed = RigidTransform(aim) @ robot.perception.pose(obj)
     body = footprint(robot.domain.objects[obj].shape, believed)
     x, y, _ = believed.translation()
     height = robot.world.height(obj)
@@ -288,7 +288,7 @@ def _in_the_way(
     robot: Robot, obj: str, sweep: Sweep, others: dict[str, tuple[Capsule, ...]]
 ) -> FailureReason | None:
     """What speaks against a sweep: the object would fall, or hand or object would hit something."""
-    body = footprint(robot.domain.objects[obj].shape, robot.world.pose(obj))
+    body = footprint(robot.domain.objects[obj].shape, robot.perception.pose(obj))
     low = [capsule for capsules in others.values() for capsule in capsules]
     if not all(on_table(part.moved(*sweep.shift), RIM) for part in body):
         return FailureReason.OFF_TABLE
@@ -363,7 +363,7 @@ def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
 
     def watch() -> bool:
         nonlocal touched
-        touched = touched or world.hand_touches(hand, obj)
+        touched = touched or robot.perception.feels(hand, obj)
         return False
 
     robot.go(motion.way)
@@ -376,11 +376,12 @@ def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
 
 def judge(robot: Robot, obj: str, before: Vector, towards: float, touched: bool) -> FailureReason:
     """What the observed displacement says of a sweep."""
-    if obj in robot.perception.observe().absent:
+    robot.perception.look()
+    if obj not in robot.perception.names():
         return FailureReason.OFF_TABLE
     if not touched:
         return FailureReason.NO_CONTACT
-    dx, dy, _ = robot.world.pose(obj).translation() - before
+    dx, dy, _ = robot.perception.pose(obj).translation() - before
     way = math.hypot(dx, dy)
     along = dx * math.cos(towards) + dy * math.sin(towards)
     if way < MOVED:

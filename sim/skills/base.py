@@ -22,8 +22,7 @@ def unusable_arguments(robot: Robot, action: GroundAction) -> FailureReason | No
     *objects, hand = action.args if action.args else ("",)
     if hand not in HANDS or len(set(objects)) < len(objects):
         return FailureReason.UNKNOWN_OBJECT
-    seen = {obj.name for obj in robot.perception.observe().objects}
-    return None if set(objects) <= seen else FailureReason.UNKNOWN_OBJECT
+    return None if set(objects) <= set(robot.perception.names()) else FailureReason.UNKNOWN_OBJECT
 
 
 def let_go_of_lost(robot: Robot) -> None:

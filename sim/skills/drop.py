@@ -25,7 +25,8 @@ def drop(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     if robot.perception.held(hand) != name or hand not in robot.grips:
         return FailureReason.HAND_EMPTY
     reason = set_down(robot, hand, _targets(robot, name, hand))
-    if reason is FailureReason.NONE and ("table", name) not in robot.world.contacts():
+    robot.perception.look()
+    if reason is FailureReason.NONE and not robot.perception.on_table(name):
         return FailureReason.MISPLACED
     return reason
 
@@ -43,12 +44,12 @@ def _targets(robot: Robot, name: str, hand: str) -> Iterator[HandTarget]:
 def free_places(robot: Robot, name: str, hand: str) -> list[tuple[float, float]]:
     """Free places on the hand's side of the table, within reach, the freest first."""
     sign = -1.0 if hand == "LeftHand" else 1.0
-    world, shapes = robot.world, robot.domain.objects
+    shapes = robot.domain.objects
     others = [
         capsule
-        for other in world.scenario.objects
+        for other in robot.perception.names()
         if other != name
-        for capsule in footprint(shapes[other].shape, world.pose(other))
+        for capsule in footprint(shapes[other].shape, robot.perception.pose(other))
     ]
     shape = shapes[name].shape
     own = outer_radius(shape)

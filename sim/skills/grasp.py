@@ -94,7 +94,7 @@ def _obstacle(robot: Robot, name: str, hand: str) -> FailureReason | None:
 def grip_choices(robot: Robot, name: str) -> tuple[float, tuple[float, ...]]:
     """Width between the fingers (metres) and the hand yaws (radians) at which the object can be held."""
     shape = robot.domain.objects[name].shape
-    yaw = robot.world.pose(name).rotation().ToRollPitchYaw().yaw_angle()
+    yaw = robot.perception.pose(name).rotation().ToRollPitchYaw().yaw_angle()
     if shape.type == "tool":
         return shape.width, (_wrap(yaw),)
     if shape.is_round:
@@ -128,7 +128,7 @@ def _targets(
     robot: Robot, name: str, hand: str, grip: Grip, aim: Vector, insets: Sequence[float]
 ) -> list[HandTarget]:
     """Where the finger tips could go: around an object's middle, or on a tool's handle."""
-    shape, X_WO = robot.domain.objects[name].shape, robot.world.pose(name)
+    shape, X_WO = robot.domain.objects[name].shape, robot.perception.pose(name)
     height = robot.world.height(name)
     up = np.array([0.0, 0.0, max(TIP_HEIGHT, height - DEPTH) - height / 2])
     if shape.type != "tool":
@@ -152,9 +152,9 @@ def _clearance(robot: Robot, name: str, target: HandTarget, grip: Grip) -> float
     """Free space (metres) between the open fingers and the nearest other object at finger height."""
     assert target.fingers_W is not None
     free = 1.0
-    for other in robot.world.scenario.objects:
-        p_WN = robot.world.pose(other).translation()
-        same_stack = math.dist(p_WN[:2], robot.world.pose(name).translation()[:2]) < 0.02
+    for other in robot.perception.names():
+        p_WN = robot.perception.pose(other).translation()
+        same_stack = math.dist(p_WN[:2], robot.perception.pose(name).translation()[:2]) < 0.02
         if other == name or same_stack or robot.top_of(other) < target.p_WP[2]:
             continue
         for sign in (1, -1):
@@ -192,7 +192,7 @@ def object_target(robot: Robot, hand: str, p_WO: Vector, fingers_W: Vector | Non
     """The hand pose that brings what it holds to `p_WO` (its centre, metres), lying level."""
     name = robot.perception.held(hand)
     assert name is not None
-    X_WO = robot.world.pose(name)
+    X_WO = robot.perception.pose(name)
     X_HO = robot.world.hand_pose(hand).inverse() @ X_WO
     up_H = X_HO.rotation().matrix() @ _up(robot.domain.objects[name].shape, X_WO)
     return HandTarget(X_HO.translation(), p_WO, up_H, np.array([0.0, 0.0, 1.0]), 0.03, fingers_W)

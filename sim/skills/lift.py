@@ -14,13 +14,13 @@ def lift(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     """See `base.Skill`. Measures `lift`: how much higher the object was while it was held up, metres."""
     name, hand = args
     world = robot.world
-    before = world.pose(name).translation()
+    before = robot.perception.pose(name).translation()
     beneath = robot.perception.supports(name)
     reason, way_up = pick_up(robot, name, hand)
     if reason is not FailureReason.NONE:
         return reason
     world.hold(HELD_UP)
-    robot.measured["lift"] = float(world.pose(name).translation()[2] - before[2])
+    robot.measured["lift"] = float(robot.perception.pose(name).translation()[2] - before[2])
     grip = robot.grips[hand]
     if robot.perception.held(hand) != name:
         release(robot, hand, grip.opening)
@@ -31,7 +31,8 @@ def lift(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     release(robot, hand, grip.opening)
     world.follow([world.with_fingers(q, hand, grip.opening) for q in way_up], 0.9)
     robot.go_home(hand)
+    robot.perception.look()
     # It is to stand again on what it stood on.
     back = set(robot.perception.supports(name)) == set(beneath)
-    on_table = bool(beneath) or ("table", name) in world.contacts()
+    on_table = bool(beneath) or robot.perception.on_table(name)
     return FailureReason.NONE if back and on_table else FailureReason.MISPLACED

@@ -41,7 +41,7 @@ def pull(robot: Robot, args: tuple[str, ...]) -> FailureReason:
 
 def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
     """Ways to drag the object to where the other hand can take it, the best first."""
-    x, y, _ = robot.world.pose(obj).translation()
+    x, y, _ = robot.perception.pose(obj).translation()
     place = (float(x), float(y))
     radius = outer_radius(robot.domain.objects[obj].shape)
     others = obstacles(robot, obj)

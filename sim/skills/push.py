@@ -36,7 +36,7 @@ def push(robot: Robot, args: tuple[str, ...]) -> FailureReason:
 
 def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
     """Ways to push the object out of reach, or at least farther away, the best first."""
-    x, y, _ = robot.world.pose(obj).translation()
+    x, y, _ = robot.perception.pose(obj).translation()
     place = (float(x), float(y))
     radius = outer_radius(robot.domain.objects[obj].shape)
     others = obstacles(robot, obj)

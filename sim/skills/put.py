@@ -25,12 +25,13 @@ def put_on(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         return FailureReason.HAND_BUSY
     if robot.perception.covered_by(target):
         return FailureReason.COVERED
-    p_WT = robot.world.pose(target).translation()
+    p_WT = robot.perception.pose(target).translation()
     place = np.array([p_WT[0], p_WT[1], robot.top_of(target) + robot.world.height(name) / 2])
     aim = robot.noise.aim(hand, "put")
     reason = set_down(robot, hand, level_targets(robot, hand, place + aim), [target])
     if reason is FailureReason.OUT_OF_REACH and robot.kinematics.reaches(hand, *map(float, p_WT[:2])):
         return FailureReason.BLOCKED
+    robot.perception.look()
     if reason is FailureReason.NONE and target not in robot.perception.supports(name):
         return FailureReason.MISPLACED
     return reason

@@ -49,7 +49,7 @@ def sweep_with_tool(
         motion = plan(regripped) if regripped is not None else None
     if motion is None:
         return FailureReason.OUT_OF_REACH
-    before = robot.world.pose(obj).translation()
+    before = robot.perception.pose(obj).translation()
     reason, touched = perform(robot, tool, obj, motion)
     return reason if reason is not FailureReason.NONE else judge(robot, obj, before, motion.course, touched)
 
@@ -60,5 +60,6 @@ def _regrip(robot: Robot, tool: HeldTool, plan: Callable[[HeldTool], Motion | No
         other = tool.held_at(inset)
         if abs(other.grip - tool.grip) >= SAME and plan(other) is not None:
             reason = set_down(robot, tool.hand, lay_targets(robot, tool, inset))
+            robot.perception.look()
             return reason if reason is not FailureReason.NONE else take(robot, tool.name, tool.hand, (inset,))
     return FailureReason.OUT_OF_REACH

@@ -149,7 +149,7 @@ def held_tool(robot: Robot, name: str, hand: str) -> HeldTool | None:
     shape = robot.domain.objects[name].shape
     if not isinstance(shape, ToolShape) or robot.perception.held(hand) != name:
         return None
-    X_HT = robot.world.hand_pose(hand).inverse() @ robot.world.pose(name)
+    X_HT = robot.world.hand_pose(hand).inverse() @ robot.perception.pose(name)
     if shape.bar <= 0 and X_HT.inverse().translation()[0] < 0:
         X_HT = X_HT @ RigidTransform(RollPitchYaw(0.0, 0.0, math.pi), np.zeros(3))
     return HeldTool(hand, name, shape, X_HT)
@@ -172,8 +172,8 @@ def obstacles(robot: Robot, *but: str) -> dict[str, tuple[Capsule, ...]]:
     """What everything else covers of the table: what lies on it, by name."""
     held = {robot.perception.held(hand) for hand in HANDS}
     return {
-        name: footprint(robot.domain.objects[name].shape, robot.world.pose(name))
-        for name in robot.world.scenario.objects
+        name: footprint(robot.domain.objects[name].shape, robot.perception.pose(name))
+        for name in robot.perception.names()
         if name not in but and name not in held
     }
 
@@ -301,7 +301,7 @@ def perform(robot: Robot, tool: HeldTool, obj: str, motion: Motion) -> tuple[Fai
 
     def watch() -> bool:
         nonlocal touched
-        touched = touched or (tool.name, obj) in robot.world.contacts()
+        touched = touched or robot.perception.feels(tool.name, obj)
         return False
 
     robot.go(motion.way)

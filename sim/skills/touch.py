@@ -27,17 +27,17 @@ def touch(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     reason = unusable(robot, obj, hand)
     if reason is not None:
         return reason
-    p_WT = robot.world.pose(obj).translation() + robot.noise.aim(hand, "grasp")
+    p_WT = robot.perception.pose(obj).translation() + robot.noise.aim(hand, "grasp")
     p_WT[2] = robot.top_of(obj)
     path, reason = _plan(robot, obj, hand, p_WT)
     if path is None:
         return reason
-    world, before = robot.world, robot.world.pose(obj).translation()
+    world, before = robot.world, robot.perception.pose(obj).translation()
     touched = False
 
     def felt() -> bool:
         nonlocal touched
-        touched = touched or world.hand_touches(hand, obj)
+        touched = touched or robot.perception.feels(hand, obj)
         return touched
 
     way, near, end = path
@@ -48,9 +48,10 @@ def touch(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         world.hold(DWELL)
     world.follow([near, way[-1]], 0.9)
     robot.go_home(hand)
+    robot.perception.look()
     if not touched:
         return FailureReason.NO_CONTACT
-    moved = float(np.linalg.norm(world.pose(obj).translation() - before))
+    moved = float(np.linalg.norm(robot.perception.pose(obj).translation() - before))
     return FailureReason.NONE if moved <= STILL else FailureReason.UNEXPECTED_EFFECT
 
 
