@@ -42,6 +42,10 @@ class StateError(CogArchError):
     """A saved state does not fit where it is to be restored."""
 
 
+class PerceptionError(CogArchError):
+    """An image, a camera or what was learned of objects cannot be used."""
+
+
 class StoreError(CogArchError):
     """The run store cannot be opened, read or written."""
 

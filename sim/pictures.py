@@ -6,9 +6,8 @@ afterwards just as well.
 
 from __future__ import annotations
 
-import ctypes
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from enum import StrEnum
 from pathlib import Path
 
@@ -17,32 +16,18 @@ import numpy as np
 from cv2.typing import MatLike
 from numpy.typing import NDArray
 from PIL import Image
-from pydrake.geometry import (
-    ClippingRange,
-    ColorRenderCamera,
-    LightParameter,
-    MakeRenderEngineVtk,
-    Meshcat,
-    MeshcatParams,
-    MeshcatVisualizer,
-    MeshcatVisualizerParams,
-    RenderCameraCore,
-    RenderEngineVtkParams,
-    Role,
-)
-from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.systems.sensors import CameraInfo
+from pydrake.geometry import Meshcat, MeshcatParams, MeshcatVisualizer, MeshcatVisualizerParams, Role
 
 from cognitive_arch.domain import Domain, Scene
-from cognitive_arch.errors import BackendError, StoreError
+from cognitive_arch.errors import StoreError
+from cognitive_arch.perception.camera import Camera
 from cognitive_arch.runlog.trajectory import Trajectory
+from sim.eyes import EyePose
+from sim.rendering import Pixels, Renderer, look_from
 from sim.scenario import build_scenario
 
-Pixels = NDArray[np.uint8]  # (height, width, 3), RGB
-RENDERER = "pictures"
 LARGE, SMALL = (960, 720), (640, 480)  # pixels
 SIDE_FROM, SIDE_TO, SIDE_VIEW = (-1.12, 0.60, 0.46), (-0.17, 0.02, 0.05), 0.75  # m, m, rad
-EYE_FROM, EYE_TO, EYE_VIEW = (-0.17, 0.0, 0.34), (-0.40, 0.0, -0.10), 1.05  # m, m, rad; sitting upright
 VIDEO_FPS = 12.5
 RECORDING_FPS, RECORDING_FRAMES = 5.0, 1200  # the viewer interpolates; more frames would take more than 15 MB
 _FONT, _INK, _PAPER = cv2.FONT_HERSHEY_SIMPLEX, (30, 30, 30), (255, 255, 255)
@@ -55,50 +40,21 @@ class View(StrEnum):
     EYE = "eye"
 
 
-def look_from(p_WC: Sequence[float], p_WT: Sequence[float]) -> RigidTransform:
-    """X_WC of a camera at `p_WC` that looks at `p_WT` (z forward, y down)."""
-    forward = np.subtract(p_WT, p_WC)
-    forward = forward / np.linalg.norm(forward)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right = right / np.linalg.norm(right)
-    R_WC = RotationMatrix(np.column_stack([right, np.cross(forward, right), forward]))
-    return RigidTransform(R_WC, p_WC)
-
-
-def check_rendering() -> None:
-    """Raise `BackendError` where the system library for rendering is missing."""
-    try:
-        ctypes.CDLL("libEGL.so.1")
-    except OSError:
-        raise BackendError(
-            "pictures need the system library libEGL; install it "
-            "(Debian, Ubuntu: sudo apt-get install libegl1) or run with --no-record"
-        ) from None
-
-
 class Stage:
     """A scene that stands still until it is told how it looks."""
 
     def __init__(self, domain: Domain, scene: Scene, meshcat: Meshcat | None = None) -> None:
         scenario = build_scenario(domain, scene)
-        self.plant, self._graph = scenario.plant, scenario.scene_graph
-        if meshcat is None:
-            check_rendering()
-            params = RenderEngineVtkParams(default_clear_color=[0.90, 0.93, 0.96], lights=_lights())
-            self._graph.AddRenderer(RENDERER, MakeRenderEngineVtk(params))
-        else:
+        self.plant, graph = scenario.plant, scenario.scene_graph
+        self._renderer = None if meshcat is not None else Renderer(graph)
+        if meshcat is not None:
             visual = MeshcatVisualizerParams(role=Role.kIllustration)
-            MeshcatVisualizer.AddToBuilder(scenario.builder, self._graph, meshcat, visual)
+            MeshcatVisualizer.AddToBuilder(scenario.builder, graph, meshcat, visual)
         self.diagram = scenario.builder.Build()
         self.context = self.diagram.CreateDefaultContext()
         self._plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
         self._starts = {name: body.floating_positions_start() for name, body in scenario.objects.items()}
-        self._eye = self._find_eye()
-
-    def _find_eye(self) -> RigidTransform:
-        """X_HC of the eyes in the head."""
-        X_WH = self.plant.GetFrameByName("head").CalcPoseInWorld(self._plant_context)
-        return X_WH.inverse() @ look_from(EYE_FROM, EYE_TO)
+        self._eye = EyePose(self.plant, self._plant_context)
 
     def show(self, positions: NDArray[np.floating]) -> None:
         """Set all positions of the plant, in the simulation's order."""
@@ -126,24 +82,12 @@ class Stage:
 
     def picture(self, view: View, size: tuple[int, int] = SMALL) -> Pixels:
         """What is to be seen from there, `size` (width, height) in pixels."""
-        X_WC, angle = look_from(SIDE_FROM, SIDE_TO), SIDE_VIEW
+        assert self._renderer is not None, "a stage for Meshcat takes no pictures"
         if view is View.EYE:
-            head = self.plant.GetFrameByName("head").CalcPoseInWorld(self._plant_context)
-            X_WC, angle = head @ self._eye, EYE_VIEW
-        core = RenderCameraCore(
-            RENDERER, CameraInfo(*size, angle), ClippingRange(0.02, 6.0), RigidTransform()
-        )
-        query = self._graph.get_query_output_port().Eval(self._graph.GetMyContextFromRoot(self.context))
-        image = query.RenderColorImage(ColorRenderCamera(core, False), self._graph.world_frame_id(), X_WC)
-        return np.array(image.data[:, :, :3], dtype=np.uint8)
-
-
-def _lights() -> list[LightParameter]:
-    return [
-        LightParameter(type="directional", direction=[0.4, -0.3, -1.0], intensity=0.9, frame="world"),
-        LightParameter(type="directional", direction=[1.0, 0.3, -0.25], intensity=0.55, frame="world"),
-        LightParameter(type="directional", direction=[0.1, -1.0, -0.3], intensity=0.45, frame="world"),
-    ]
+            camera = self._eye.camera(self._plant_context, size)
+        else:
+            camera = Camera.with_view(size, SIDE_VIEW, look_from(SIDE_FROM, SIDE_TO).GetAsMatrix4())
+        return self._renderer.color(self.context, camera)
 
 
 def save_picture(pixels: Pixels, path: Path) -> None:

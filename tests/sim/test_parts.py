@@ -12,7 +12,7 @@ import pytest
 from cognitive_arch.domain import Domain, ObjectSpec
 from cognitive_arch.errors import BackendError
 from cognitive_arch.scenes import load_scene
-from sim import pictures
+from sim import rendering
 from sim.assets import robot_urdf, roll_pitch_yaw, rotation
 from sim.environment import DrakeEnvironment
 from sim.kinematics import DOWN, HandTarget, Kinematics, fingertip, palm_axis
@@ -129,9 +129,9 @@ def test_missing_libegl_is_one_clear_line(monkeypatch: pytest.MonkeyPatch) -> No
     def missing(name: str) -> None:
         raise OSError(name)
 
-    monkeypatch.setattr("sim.pictures.ctypes.CDLL", missing)
+    monkeypatch.setattr("sim.rendering.ctypes.CDLL", missing)
     with pytest.raises(BackendError, match="apt-get install libegl1"):
-        pictures.check_rendering()
+        rendering.check_rendering()
 
 
 def test_too_wide_to_grasp(domain: Domain) -> None:

@@ -1,0 +1,1 @@
+"""From images to what is there: segmentation, regions, descriptors, recognition and geometry."""
