@@ -34,11 +34,11 @@ HOME: Mapping[str, float] = {  # rad; both hands beside the table's work area, w
     "torso_pitch": 0.1,
     "l_shoulder_pitch": -0.5,
     "l_shoulder_roll": 0.6,
-    "l_shoulder_yaw": 0.3,
+    "l_shoulder_yaw": -0.3,
     "l_elbow": 1.4,
     "r_shoulder_pitch": -0.5,
     "r_shoulder_roll": 0.6,
-    "r_shoulder_yaw": 0.3,
+    "r_shoulder_yaw": -0.3,
     "r_elbow": 1.4,
 }
 

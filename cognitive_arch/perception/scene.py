@@ -1,0 +1,204 @@
+"""From one look with colour and depth to detections: which things may be where.
+
+What rises above the table is cut into regions where colour or height change at a step. Each region is
+recognised by its look and fitted with the shapes of the things that it may be; both together tell how likely
+it is each of them. What lies under something else shows a rim at most, and is left to memory.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from cognitive_arch.perception.camera import Camera
+from cognitive_arch.perception.pose import PoseEstimate, estimate_pose
+from cognitive_arch.shapes import Shape
+
+Mask = NDArray[np.bool_]  # (height, width)
+Classify = Callable[[NDArray[np.uint8], Mask], list[tuple[str, float]]]
+UNKNOWN = "unknown"
+
+RISE = 0.004  # m above the table at which a thing begins
+CEILING = 0.45  # m above the table at which the world ends
+STEP = 0.006  # m of height between neighbouring pixels of different things
+SHADE = 0.02  # of chromaticity between neighbouring pixels of different things
+DARK = 120.0  # sum of the three colours below which chromaticity means less
+SMALLEST = 40  # pixels
+NEARER = 0.006  # m by which what covers an edge is nearer
+MISFIT = 0.003  # m of residual at which a shape becomes unlikely
+SEEN = 0.25  # of a thing, below which its place is not told
+POSSIBLE = 1e-3  # probability below which a label is not tried
+
+
+@dataclass(frozen=True, slots=True)
+class Region:
+    """Pixels of one thing, as far as one can tell: `mask` (height, width), the places of all of them,
+    `surface` (n, 3), and of those at its own edges, `outline` (m, 3), metres."""
+
+    mask: Mask
+    surface: NDArray[np.float64]
+    outline: NDArray[np.float64]
+
+
+@dataclass(frozen=True, slots=True)
+class Hypothesis:
+    """What a region would be as a certain thing."""
+
+    probability: float
+    estimate: PoseEstimate
+
+
+@dataclass(frozen=True, slots=True)
+class Sighting:
+    """A region and what it may be, by name, and how likely it is something else."""
+
+    region: Region
+    hypotheses: Mapping[str, Hypothesis]
+    unknown: float
+
+    @property
+    def label(self) -> str:
+        """What it is most likely."""
+        best = max(self.hypotheses.items(), key=lambda item: item[1].probability, default=None)
+        return best[0] if best is not None and best[1].probability > self.unknown else UNKNOWN
+
+
+class SceneView:
+    """One look at a table of a known height (m): colour (height, width, 3), depth (height, width) in metres,
+    and the robot's own body in it, (height, width)."""
+
+    def __init__(
+        self,
+        color: NDArray[np.uint8],
+        depth: NDArray[np.float32],
+        own: Mask,
+        camera: Camera,
+        table: float,
+    ) -> None:
+        self.color, self.depth, self.own, self.camera, self.table = color, depth, own, camera, table
+        self.points = camera.points(depth)
+
+    def raised(self) -> Mask:
+        """What rises above the table and is not the robot itself."""
+        height = np.nan_to_num(self.points[:, :, 2], nan=-1.0) - self.table
+        return (height > RISE) & (height < CEILING) & ~self.own
+
+    def regions(self) -> Iterator[Region]:
+        """The things in view, cut apart."""
+        raised = self.raised()
+        x, y, width, height = cv2.boundingRect(raised.view(np.uint8))
+        if width == 0:
+            return
+        rows, columns = slice(y, y + height), slice(x, x + width)
+        core = raised[rows, columns] & ~self._steps(rows, columns)
+        count, labels, stats, _ = cv2.connectedComponentsWithStats(core.view(np.uint8), connectivity=4)
+        for label in range(1, count):
+            if stats[label, cv2.CC_STAT_AREA] < SMALLEST:
+                continue
+            mask = np.zeros(raised.shape, np.bool_)
+            mask[rows, columns] = labels == label
+            yield self._region(_grown(mask, raised))
+
+    def _steps(self, rows: slice, columns: slice) -> Mask:
+        """Where colour or height differ from the pixel to the left or above."""
+        color = self.color[rows, columns].astype(np.float32)
+        total = color.sum(axis=2) + 1e-3
+        chroma = color[:, :, :2] / total[:, :, None]
+        lit = np.minimum(total / DARK, 1.0)
+        z = np.nan_to_num(self.points[rows, columns, 2], nan=-1.0)
+        found = np.zeros(z.shape, np.bool_)
+        for axis in (0, 1):
+            after, before = [slice(None)] * 2, [slice(None)] * 2
+            after[axis], before[axis] = slice(1, None), slice(None, -1)
+            a, b = tuple(after), tuple(before)
+            shade = np.abs(chroma[a] - chroma[b]).max(axis=2) * np.minimum(lit[a], lit[b])
+            found[a] |= (shade > SHADE) | (np.abs(z[a] - z[b]) > STEP)
+        return found
+
+    def _region(self, mask: Mask) -> Region:
+        inner = cv2.erode(mask.view(np.uint8), np.ones((3, 3), np.uint8), borderValue=0)
+        edge = mask & (inner == 0)
+        edge[[0, -1]] = edge[:, [0, -1]] = False  # where the image ends the thing may go on
+        rows, columns = np.nonzero(edge)
+        covered = np.zeros(len(rows), np.bool_)
+        own_depth = self.depth[rows, columns]
+        for dy in (-2, 0, 2):
+            for dx in (-2, 0, 2):
+                r = np.clip(rows + dy, 0, mask.shape[0] - 1)
+                c = np.clip(columns + dx, 0, mask.shape[1] - 1)
+                covered |= ~mask[r, c] & (self.depth[r, c] < own_depth - NEARER)
+        outline = self.points[rows[~covered], columns[~covered]].astype(np.float64)
+        return Region(mask, self.points[mask].astype(np.float64), outline)
+
+    def union(self, one: Region, other: Region) -> Region:
+        """Two regions as one."""
+        return Region(
+            one.mask | other.mask,
+            np.vstack([one.surface, other.surface]),
+            np.vstack([one.outline, other.outline]),
+        )
+
+
+def _grown(mask: Mask, raised: Mask) -> Mask:
+    """With the pixels back that were lost to the step at its edge."""
+    wider = cv2.dilate(mask.view(np.uint8), np.array([[1, 1, 0], [1, 1, 0], [0, 0, 0]], np.uint8))
+    return (wider > 0) & raised
+
+
+def sightings(view: SceneView, classify: Classify, shapes: Mapping[str, Shape]) -> list[Sighting]:
+    """What is in view. `shapes` are those of all things that there may be; `classify` names regions."""
+    found = [_sighting(view, region, classify, shapes) for region in view.regions()]
+    return _joined([sighting for sighting in found if sighting is not None], view, shapes)
+
+
+def _sighting(
+    view: SceneView, region: Region, classify: Classify, shapes: Mapping[str, Shape]
+) -> Sighting | None:
+    likely = dict(classify(view.color, region.mask))
+    known = {name: p for name, p in likely.items() if name in shapes and p > POSSIBLE}
+    unknown = 1.0 - sum(known.values())
+    hypotheses = {}
+    for name, probability in known.items():
+        estimate = estimate_pose(shapes[name], region.surface, region.outline)
+        if estimate is not None and estimate.seen >= SEEN:
+            fits = math.exp(-((estimate.residual / MISFIT) ** 2) / 2)
+            hypotheses[name] = Hypothesis(probability * fits, estimate)
+    return Sighting(region, hypotheses, max(unknown, POSSIBLE))
+
+
+def _joined(found: list[Sighting], view: SceneView, shapes: Mapping[str, Shape]) -> list[Sighting]:
+    """Things that something in front of them cuts in two, in one piece again."""
+    kept: list[Sighting] = []
+    for sighting in sorted(found, key=lambda s: -len(s.region.surface)):
+        for n, other in enumerate(kept):
+            whole = _whole(other, sighting, view, shapes)
+            if whole is not None:
+                kept[n] = whole
+                break
+        else:
+            kept.append(sighting)
+    return kept
+
+
+def _whole(one: Sighting, other: Sighting, view: SceneView, shapes: Mapping[str, Shape]) -> Sighting | None:
+    """Both as one, if what `one` most likely is covers both, at one height, and nothing else does better."""
+    name = one.label
+    if name == UNKNOWN or other.label not in (name, UNKNOWN):
+        return None
+    if abs(_top(one.region) - _top(other.region)) > STEP:
+        return None
+    region = view.union(one.region, other.region)
+    estimate = estimate_pose(shapes[name], region.surface, region.outline)
+    if estimate is None or estimate.residual > MISFIT or estimate.seen < one.hypotheses[name].estimate.seen:
+        return None
+    hypotheses = {**one.hypotheses, name: Hypothesis(one.hypotheses[name].probability, estimate)}
+    return Sighting(region, hypotheses, one.unknown)
+
+
+def _top(region: Region) -> float:
+    return float(np.percentile(region.surface[:, 2], 95))

@@ -1,0 +1,260 @@
+"""Tracking: from the detections of one look after another to things that stay the same things.
+
+Data association, persistence and occlusion (thesis Sec. 6.4.4). A thing that is in view is where it was seen;
+one in a hand moves with the hand; one that is hidden is where it was last seen, until its place is seen to be
+empty or taken by something else.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from cognitive_arch.shapes import Shape
+
+Pose = NDArray[np.float64]  # (4, 4), a thing or a hand in the root frame, m
+UNKNOWN = "unknown"
+FAR, FAR_COST = 0.15, 2.0  # m after which distance from where a thing was speaks no further against it
+NEW_COST = 0.5  # in log probability, for a thing that was not there before
+LEAST = 1e-6  # probability
+SAME = 0.008  # m that a thing at rest may seem to move
+DRIFT = 0.002  # m of uncertainty that one look later adds
+LOST = 0.08  # m from where the hand would hold it at which a thing was not in the hand
+LOOSE = 0.05  # m of uncertainty about what has just left a hand
+IN_HAND = 0.002  # m, of what is in a hand
+TOUCHING = 0.006  # m between an underside and what carries it, as seen
+WITHIN = 0.004  # m by which two things cannot overlap in height
+
+
+@dataclass(frozen=True, slots=True)
+class Candidate:
+    """What a detection would be as a certain thing: how likely, where, how exact (m)."""
+
+    probability: float
+    pose: Pose
+    sigma: float
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """Something in view: what it may be, by name, and how likely it is none of these."""
+
+    candidates: Mapping[str, Candidate]
+    unknown: float = LEAST
+
+
+class Place(Enum):
+    """What is to be seen where a thing should be."""
+
+    EMPTY = "empty"  # one sees what is behind it
+    HIDDEN = "hidden"  # something is in front of it
+    TAKEN = "taken"  # something is there, as it should
+
+
+@dataclass(frozen=True, slots=True)
+class HandSense:
+    """A hand by proprioception: its pose, and whether its fingers press on something."""
+
+    pose: Pose
+    gripping: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Track:
+    """A thing that is believed to be there; `in_hand` is its pose in the frame of the hand that holds it."""
+
+    pose: Pose
+    sigma: float
+    visible: bool = True
+    hand: str | None = None
+    in_hand: Pose | None = None
+
+
+@dataclass
+class Tracker:
+    """What is where. `shapes` are those of all things that there may be, by name; `table` its height, m."""
+
+    shapes: Mapping[str, Shape]
+    table: float
+    tracks: dict[str, Track] = field(default_factory=dict)
+    gone: set[str] = field(default_factory=set)
+
+    def update(
+        self,
+        detections: Sequence[Detection],
+        hands: Mapping[str, HandSense],
+        place: Callable[[str, Pose], Place],
+    ) -> None:
+        """Fold one look in. `place` tells what is to be seen where a thing should be."""
+        self.feel(hands)
+        found = self._associate(detections)
+        for name, candidate in found.items():
+            self._see(name, candidate)
+        for name in [name for name in self.tracks if name not in found]:
+            self._miss(name, place)
+        self.gone -= self.tracks.keys()
+
+    def feel(self, hands: Mapping[str, HandSense]) -> None:
+        """Fold proprioception in: what is held moves along, what is no longer gripped is somewhere below."""
+        for name, track in self.tracks.items():
+            if track.hand is None or track.in_hand is None:
+                continue
+            hand = hands[track.hand]
+            moved = replace(track, pose=hand.pose @ track.in_hand, sigma=IN_HAND)
+            if not hand.gripping:
+                moved = replace(moved, hand=None, in_hand=None, sigma=LOOSE)
+            self.tracks[name] = moved
+
+    def take_hold(self, hand: str, name: str, X_WH: Pose, X_WO: Pose) -> None:
+        """The fingers of a hand at `X_WH` close around a thing at `X_WO`."""
+        for other, track in self.tracks.items():
+            if track.hand == hand:
+                self.tracks[other] = replace(track, hand=None, in_hand=None)
+        in_hand = np.linalg.inv(X_WH) @ X_WO
+        self.tracks[name] = Track(X_WO, IN_HAND, True, hand, in_hand)
+
+    def held(self, hand: str) -> str | None:
+        """What is believed to be in a hand."""
+        return next((name for name, track in self.tracks.items() if track.hand == hand), None)
+
+    def bottom(self, name: str) -> float:
+        """Height of a thing's underside, m."""
+        return float(self.tracks[name].pose[2, 3]) - self.shapes[name].height / 2
+
+    def top(self, name: str) -> float:
+        """Height of a thing's upper side, m."""
+        return float(self.tracks[name].pose[2, 3]) + self.shapes[name].height / 2
+
+    def on_table(self, name: str) -> bool:
+        """Whether a thing rests on the table itself."""
+        return self.tracks[name].hand is None and self.bottom(name) - self.table < TOUCHING
+
+    def supports(self, name: str) -> tuple[str, ...]:
+        """The things that one rests on: below it sideways, their upper side at its underside."""
+        if self.tracks[name].hand is not None or self.on_table(name):
+            return ()
+        below = [
+            (abs(self.bottom(name) - self.top(other)), other)
+            for other, track in self.tracks.items()
+            if other != name and track.hand is None and self._above(name, other)
+        ]
+        near = [other for gap, other in sorted(below) if gap < TOUCHING]
+        return tuple(near or [other for _, other in sorted(below)[:1]])
+
+    def _above(self, upper: str, lower: str) -> bool:
+        p, q = self.tracks[upper].pose[:3, 3], self.tracks[lower].pose[:3, 3]
+        sideways = math.hypot(p[0] - q[0], p[1] - q[1])
+        return bool(p[2] > q[2] + WITHIN and sideways < min(self.shapes[lower].extent) / 2)
+
+    # -- one look -----------------------------------------------------------------------------------------
+
+    def _associate(self, detections: Sequence[Detection]) -> dict[str, Candidate]:
+        """Which detection is which thing: the likeliest assignment of all of them together."""
+        names = sorted({name for detection in detections for name in detection.candidates})
+        if not names:
+            return {}
+        # One column per thing, then one per detection for its being none of them.
+        scores = np.full((len(detections), len(names) + len(detections)), math.log(LEAST) - 10)
+        for row, detection in enumerate(detections):
+            scores[row, len(names) + row] = math.log(max(detection.unknown, LEAST))
+            for name, candidate in detection.candidates.items():
+                scores[row, names.index(name)] = self._score(name, candidate)
+        rows, columns = linear_sum_assignment(-scores)
+        return {
+            names[column]: detections[row].candidates[names[column]]
+            for row, column in zip(rows, columns, strict=True)
+            if column < len(names) and names[column] in detections[row].candidates
+        }
+
+    def _score(self, name: str, candidate: Candidate) -> float:
+        likely = math.log(max(candidate.probability, LEAST))
+        track = self.tracks.get(name)
+        if track is None:
+            return likely - NEW_COST
+        moved = float(np.linalg.norm(track.pose[:3, 3] - candidate.pose[:3, 3]))
+        return likely - min(moved / FAR, 1.0) * FAR_COST
+
+    def _see(self, name: str, seen: Candidate) -> None:
+        track = self.tracks.get(name)
+        if track is not None and track.hand is not None:
+            if np.linalg.norm(track.pose[:3, 3] - seen.pose[:3, 3]) < LOST:
+                self.tracks[name] = replace(track, visible=True)
+                return
+            track = None  # it lies somewhere else: the hand has something else, or nothing
+        if track is None:
+            self.tracks[name] = Track(seen.pose, seen.sigma)
+            return
+        apart = float(np.linalg.norm(track.pose[:3, 3] - seen.pose[:3, 3]))
+        if apart > max(SAME, 2 * seen.sigma) or apart > 3 * math.hypot(track.sigma, seen.sigma):
+            self.tracks[name] = Track(seen.pose, seen.sigma)
+            return
+        before = track.sigma**2 + DRIFT**2
+        weight = before / (before + seen.sigma**2)
+        # Of two looks at the same thing at rest the more exact one counts more; the yaw is that one's.
+        pose = (seen.pose if seen.sigma <= track.sigma else track.pose).copy()
+        pose[:3, 3] = track.pose[:3, 3] + weight * (seen.pose[:3, 3] - track.pose[:3, 3])
+        sigma = math.sqrt(before * seen.sigma**2 / (before + seen.sigma**2))
+        self.tracks[name] = Track(pose, sigma)
+
+    def _miss(self, name: str, place: Callable[[str, Pose], Place]) -> None:
+        track = self.tracks[name]
+        if track.hand is not None:
+            return
+        verdict = place(name, track.pose)
+        if verdict is Place.EMPTY or self._taken_by_another(name):
+            del self.tracks[name]
+            self.gone.add(name)
+        else:
+            self.tracks[name] = replace(track, visible=verdict is Place.TAKEN)
+
+    def _taken_by_another(self, name: str) -> bool:
+        """Whether something in view is where this one was."""
+        seen = (other for other, track in self.tracks.items() if other != name and track.visible)
+        return any(self._overlap(name, other) for other in seen)
+
+    def _overlap(self, name: str, other: str) -> bool:
+        p, q = self.tracks[name].pose[:3, 3], self.tracks[other].pose[:3, 3]
+        sideways = math.hypot(p[0] - q[0], p[1] - q[1])
+        deep = min(self.top(name), self.top(other)) - max(self.bottom(name), self.bottom(other))
+        room = min(*self.shapes[name].extent, *self.shapes[other].extent) / 2
+        return bool(deep > WITHIN and sideways < room)
+
+    # -- keeping ------------------------------------------------------------------------------------------
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data; `restore` reads it back."""
+        rows = {
+            name: {
+                "pose": track.pose.tolist(),
+                "sigma": track.sigma,
+                "visible": track.visible,
+                "hand": track.hand,
+                "in_hand": None if track.in_hand is None else track.in_hand.tolist(),
+            }
+            for name, track in self.tracks.items()
+        }
+        return {"tracks": rows, "gone": sorted(self.gone)}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """The inverse of `to_json`; raises `ValueError` for things that there are not."""
+        names: Iterable[str] = [*saved["tracks"], *saved["gone"]]
+        if not set(names) <= set(self.shapes):
+            raise ValueError("it speaks of other things")
+        self.tracks = {
+            name: Track(
+                np.array(row["pose"], float).reshape(4, 4),
+                float(row["sigma"]),
+                bool(row["visible"]),
+                row["hand"],
+                None if row["in_hand"] is None else np.array(row["in_hand"], float).reshape(4, 4),
+            )
+            for name, row in saved["tracks"].items()
+        }
+        self.gone = set(saved["gone"])
