@@ -16,12 +16,14 @@ import typer
 
 from cognitive_arch import __version__
 from cognitive_arch.errors import CogArchError, ConfigError, one_line
+from cognitive_arch.verbs import sweeps
 from cognitive_arch.verbs.common import (
     Json,
     PlannerOption,
     RulesOption,
     SceneOption,
     SeedOption,
+    Stopped,
     StoreOption,
     print_answer,
 )
@@ -169,7 +171,7 @@ def _carry_out(work: Callable[[Progress], dict[str, Any]], store: Path, as_json:
             result = work(live.progress)
     except RunInterrupted as stopped:
         command = report.resume_command(stopped.run_id, store)
-        raise _Stopped(f"finished steps are kept, go on with: {command}") from None
+        raise Stopped(f"finished steps are kept, go on with: {command}") from None
     print_answer(result, report.result_text(result), as_json)
     if not result["success"]:
         raise typer.Exit(1)
@@ -276,6 +278,9 @@ def inspect(
     print_answer(view.data, view.text, as_json)
 
 
+sweeps.register(app)
+
+
 def main() -> None:
     """Entry point of `cogarch`: exit code 0 done, 1 honestly failed, 2 bad input, 130 interrupted."""
     sys.exit(_guarded())
@@ -294,7 +299,7 @@ def _guarded() -> int:
         return code if isinstance(code, int) else 0
     except CogArchError as error:
         return _complain(str(error))
-    except _Stopped as stopped:
+    except Stopped as stopped:
         return _interrupted(f"; {stopped}")
     except KeyboardInterrupt:
         return _interrupted()
@@ -307,10 +312,6 @@ def _guarded() -> int:
         if message is None:
             raise
         return _complain(message)
-
-
-class _Stopped(Exception):
-    """Ctrl-C with something to say; no `KeyboardInterrupt`, which the argument parser would swallow."""
 
 
 def _interrupted(more: str = "") -> int:

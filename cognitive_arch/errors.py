@@ -50,6 +50,10 @@ class StoreError(CogArchError):
     """The run store cannot be opened, read or written."""
 
 
+class SweepError(CogArchError):
+    """A sweep, or the folder it is to be kept in, is unusable."""
+
+
 def one_line(text: object, limit: int = 80) -> str:
     """`text` in printable form on one line, cut to `limit` characters (for quoting bad input)."""
     flat = " ".join("".join(c if c.isprintable() else " " for c in str(text)).split())

@@ -14,11 +14,11 @@ import numpy as np
 
 from cognitive_arch.domain import Domain, Scene, load_domain
 from cognitive_arch.errors import BackendError, ConfigError, RuleError, StoreError, one_line, unknown
-from cognitive_arch.evaluation.metrics import speed
 from cognitive_arch.execution.backends import BACKENDS, make_environment, reach_model
 from cognitive_arch.execution.cycle import CycleSettings, CycleState, EpisodeResult, PlanningCycle, Step
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.heuristics import Heuristics
+from cognitive_arch.execution.metrics import speed
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
 from cognitive_arch.language.goals import GoalCompiler
@@ -199,14 +199,16 @@ class Session:
     """One robot in one world, given one instruction after another.
 
     The world model lasts from one instruction to the next, and so does what the hands hold. The outside
-    events of the scene happen during the first instruction.
+    events of the scene happen during the first instruction. `planner` replaces the one that `config` names.
     """
 
-    def __init__(self, config: RunConfig, setting: Setting, environment: Environment) -> None:
+    def __init__(
+        self, config: RunConfig, setting: Setting, environment: Environment, planner: Planner | None = None
+    ) -> None:
         self._setting = setting
         self._environment = environment
         self._heuristics = config.heuristics
-        self._planner: Planner = make_planner(config.planner)
+        self._planner = make_planner(config.planner) if planner is None else planner
         # The environment draws from `seed` itself, the planner from a stream of its own.
         self._rng = np.random.default_rng(np.random.SeedSequence(config.seed).spawn(1)[0])
         self._world = WorldModel()

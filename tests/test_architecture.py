@@ -86,6 +86,12 @@ def test_imports_point_one_way(package: str) -> None:
                 assert parts[1] in ALLOWED[package] | FOUNDATION | {package}, f"{path} imports {name}"
 
 
+def test_session_knows_nothing_of_evaluation() -> None:
+    """Evaluations run sessions, so no session may need one."""
+    for path in (*modules("cognitive_arch/execution"), ROOT / "cognitive_arch/session.py"):
+        assert not [name for name in imports(path) if name.startswith("cognitive_arch.evaluation")], path
+
+
 def test_every_package_has_its_rule() -> None:
     packages = {p.parent.name for p in (ROOT / "cognitive_arch").glob("*/__init__.py")}
     assert packages <= set(ALLOWED)

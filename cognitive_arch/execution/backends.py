@@ -46,12 +46,13 @@ def make_environment(
     record: bool = False,
     video: bool = False,
     reach: str | None = None,
+    quiet_release: bool = False,
 ) -> Environment:
     """An environment for one scene; raises `BackendError` for an unknown or unusable one.
 
     `rules` are the truth of the symbolic world; physics needs none. `record` keeps pictures and
     what else `save_artifacts` finishes, with `video` a video, too. `reach` is one of the backend's
-    `REACH_MODELS`.
+    `REACH_MODELS`. `quiet_release` is for the symbolic one (see there).
     """
     if backend not in BACKENDS:
         raise BackendError(unknown("backend", backend, BACKENDS))
@@ -59,7 +60,7 @@ def make_environment(
     if backend == "symbolic":
         from cognitive_arch.execution.symbolic import SymbolicEnvironment
 
-        return SymbolicEnvironment(domain, scene, rules, noise, jitter)
+        return SymbolicEnvironment(domain, scene, rules, noise, jitter, quiet_release)
     module = drake_module("sim.environment")
     environment: Environment = module.DrakeEnvironment(
         domain, scene, noise=asdict(noise), jitter=jitter, record=record, video=video, reach=reach

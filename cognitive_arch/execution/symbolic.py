@@ -56,13 +56,18 @@ _THINGS = TypeAdapter(list[tuple[str, _Thing]])
 
 @dataclass
 class SymbolicEnvironment:
-    """Implements `Environment`; `jitter` (metres) moves the objects at the start of each episode."""
+    """Implements `Environment`; `jitter` (metres) moves the objects at the start of each episode.
+
+    With `quiet_release` an action whose rule empties a hand (put, drop) never fails by noise, as in the
+    published runs; the text has it as noisy as its arm.
+    """
 
     domain: Domain
     scene: Scene
     rules: RuleSet
     noise: NoiseLevels = NoiseLevels()
     jitter: float = 0.0
+    quiet_release: bool = False
     _things: dict[str, _Thing] = field(default_factory=dict)
     _properties: frozenset[str] = frozenset()
     _steps: int = 0
@@ -109,7 +114,8 @@ class SymbolicEnvironment:
         rule = covering_rule(self._ground, action, self._atoms())
         if rule is None:
             return SkillResult(Outcome.FAILURE, FailureReason.NO_EFFECT)
-        if self._rng.random() < self.noise.of(action, self.domain.capabilities):
+        level = self.noise.of(action, self.domain.capabilities)
+        if self._rng.random() < (0.0 if self.quiet_release and _releases(rule) else level):
             return SkillResult(Outcome.FAILURE, FailureReason.NOISE)
         before = self._xy(action.args[0])
         self._apply(rule)
@@ -334,6 +340,10 @@ class SymbolicEnvironment:
             if free and place[0] <= -0.2 and hand in self.scene.reach.hands(*place):
                 return place
         return x0, y0
+
+
+def _releases(rule: GroundRule) -> bool:
+    return any(lit.atom.predicate == "inHand" and not lit.positive for lit in rule.outcomes[0].literals)
 
 
 def _puts(literal: Literal) -> bool:

@@ -23,6 +23,9 @@ from cognitive_arch.relational.symbols import (
     Predicate,
 )
 
+GROUNDINGS_KEPT = 4
+"""So many groundings of one rule set are kept: an environment and whoever acts in it ask for the same."""
+
 
 class Entity(NamedTuple):
     """A named thing of the scene and its type in the rules (`hand`, `object`, `tool`)."""
@@ -126,6 +129,9 @@ class RuleSet:
     predicates: Mapping[str, Predicate]
     rules: tuple[NIDRule, ...]
     source: str = field(default="", compare=False)
+    _grounded: dict[object, tuple[GroundRule, ...]] = field(
+        default_factory=dict, init=False, repr=False, compare=False
+    )
 
     def is_a(self, type_: str, ancestor: str) -> bool:
         """Whether `type_` is `ancestor` or below it."""
@@ -145,9 +151,14 @@ class RuleSet:
         itself can never apply and is left out. `actions` restricts to those action names.
         Raises `GroundingError` for an entity whose type the rules do not know.
         """
-        grounder = _Grounder(self, entities)
-        wanted = [rule for rule in self.rules if actions is None or rule.action in actions]
-        return tuple(ground for rule in wanted for ground in grounder.groundings(rule))
+        wanted = tuple(n for n, rule in enumerate(self.rules) if actions is None or rule.action in actions)
+        key = (tuple(sorted(set(entities))), wanted)
+        if key not in self._grounded:
+            if len(self._grounded) >= GROUNDINGS_KEPT:
+                self._grounded.clear()
+            grounder = _Grounder(self, entities)
+            self._grounded[key] = tuple(g for n in wanted for g in grounder.groundings(self.rules[n]))
+        return self._grounded[key]
 
     def ground_call(
         self, rule: NIDRule, args: Sequence[str], entities: Sequence[Entity]

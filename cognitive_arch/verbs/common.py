@@ -29,6 +29,10 @@ PlannerOption = Annotated[
 SeedOption = Annotated[int, typer.Option(help="Seed of everything random.")]
 
 
+class Stopped(Exception):
+    """Ctrl-C with something to say; no `KeyboardInterrupt`, which the argument parser would swallow."""
+
+
 def print_answer(data: dict[str, Any], text: str, as_json: bool) -> None:
     """Print the answer of a verb on stdout: `data` as JSON, or `text`."""
     shown = json.dumps(data, sort_keys=False, allow_nan=False) if as_json else text

@@ -1,0 +1,125 @@
+"""What of the published tables and figures can be recomputed: a registry, and the form of the answer."""
+
+from __future__ import annotations
+
+import importlib
+import time
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, TypeAlias
+
+from cognitive_arch.errors import ConfigError, unknown
+
+
+@dataclass(frozen=True, slots=True)
+class Options:
+    """What a reproduction may use: `out` is a folder for its files, `data` one with data sets.
+
+    `episodes` is None for as many as published; `jobs` processes may share the work.
+    """
+
+    out: Path
+    data: Path | None = None
+    episodes: int | None = None
+    seed: int = 0
+    jobs: int = 1
+    on_progress: Callable[[int, int], None] = lambda done, total: None
+    on_notice: Callable[[str], None] = lambda text: None
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One thing that was published, what we got, and whether that agrees.
+
+    `what` says what is compared, `published` quotes or gives the figure, `ours` gives ours.
+    """
+
+    what: str
+    published: str
+    ours: str
+    holds: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduced:
+    """The answer: checks, the numbers behind them (plain data), and the files that were written."""
+
+    checks: tuple[Check, ...]
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+    files: tuple[Path, ...] = ()
+
+
+Recompute: TypeAlias = Callable[[Options], Reproduced]
+
+
+@dataclass(frozen=True, slots=True)
+class Reproduction:
+    """What is recomputed, where it was published, and by which `module:function` (a `Recompute`)."""
+
+    title: str
+    source: str
+    function: str
+
+    def load(self) -> Recompute:
+        """The function; its module is imported only now."""
+        module, _, name = self.function.partition(":")
+        recompute: Recompute = getattr(importlib.import_module(module), name)
+        return recompute
+
+
+_SWEEPS = "cognitive_arch.evaluation.published_sweeps"
+
+REPRODUCTIONS: Mapping[str, Reproduction] = {
+    "fig58": Reproduction("simple scene, both arms equally noisy", "thesis Fig. 58", f"{_SWEEPS}:fig58"),
+    "fig59": Reproduction("simple scene, left arm's noise varied", "thesis Fig. 59", f"{_SWEEPS}:fig59"),
+    "fig60": Reproduction("complex scene, both arms equally noisy", "thesis Fig. 60", f"{_SWEEPS}:fig60"),
+    "fig61": Reproduction("complex scene, left arm's noise varied", "thesis Fig. 61", f"{_SWEEPS}:fig61"),
+}
+"""All that `cogarch reproduce` knows, by name."""
+
+
+def reproduce(name: str, options: Options) -> dict[str, Any]:
+    """Recompute `name`; returns the fields of `reproduce --json`. Raises `ConfigError` for an unknown one."""
+    if name not in REPRODUCTIONS:
+        raise ConfigError(unknown("table or figure", name, REPRODUCTIONS))
+    entry = REPRODUCTIONS[name]
+    started = time.perf_counter()
+    found = entry.load()(options)
+    return {
+        "name": name,
+        "title": entry.title,
+        "source": entry.source,
+        "success": all(check.holds for check in found.checks),
+        "checks": [
+            {"what": c.what, "published": c.published, "ours": c.ours, "holds": c.holds} for c in found.checks
+        ],
+        **found.numbers,
+        "seed": options.seed,
+        "files": [str(path) for path in found.files],
+        "wall_s": round(time.perf_counter() - started, 3),
+    }
+
+
+def listing() -> dict[str, Any]:
+    """All names with what they stand for."""
+    return {name: {"title": entry.title, "source": entry.source} for name, entry in REPRODUCTIONS.items()}
+
+
+def listing_text() -> str:
+    """The same for a terminal."""
+    width = max(map(len, REPRODUCTIONS))
+    return "\n".join(f"{name:<{width}}  {e.source}: {e.title}" for name, e in REPRODUCTIONS.items())
+
+
+def answer_text(answer: Mapping[str, Any]) -> str:
+    """The answer of `reproduce` for a terminal: every check with ours beside the published."""
+    lines = [f"{answer['source']}: {answer['title']}"]
+    for check in answer["checks"]:
+        lines.append(f"{'agrees ' if check['holds'] else 'DIFFERS'}  {check['what']}")
+        lines.append(f"           published  {check['published']}")
+        lines.append(f"           ours       {check['ours']}")
+    agreeing = sum(check["holds"] for check in answer["checks"])
+    lines.append(f"{agreeing} of {len(answer['checks'])} agree; {answer['wall_s']:.1f} s")
+    lines.extend(f"wrote {path}" for path in answer["files"] if not path.endswith(".svg"))
+    return "\n".join(lines)

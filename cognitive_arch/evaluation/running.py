@@ -1,0 +1,184 @@
+"""Running a sweep: in this process, in several, or on a cluster; the rows are the same and come in order."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import threading
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from functools import partial
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from cognitive_arch.errors import SweepError, one_line
+from cognitive_arch.evaluation.episodes import run_job
+from cognitive_arch.evaluation.rows import Row, open_rows
+from cognitive_arch.evaluation.sweep import Job, SweepConfig
+from cognitive_arch.planning.compilation import warm_up
+from cognitive_arch.planning.registry import make_planner
+from cognitive_arch.runlog.records import versions
+
+PATIENCE_S = 5
+"""How long a scheduler may take to answer."""
+
+AHEAD = 4
+"""Jobs per worker that a cluster is given beforehand."""
+
+Work = Callable[[Job], list[Row]]
+
+
+class SweepInterrupted(KeyboardInterrupt):
+    """Ctrl-C while a sweep goes on; `done` rows of `total` are kept."""
+
+    def __init__(self, done: int, total: int) -> None:
+        super().__init__(f"{done} of {total} episodes are kept")
+        self.done, self.total = done, total
+
+
+def run_sweep(
+    config: SweepConfig,
+    folder: Path,
+    command: str = "",
+    *,
+    jobs: int = 1,
+    dask: str | None = None,
+    remember: bool = True,
+    on_rows: Callable[[int, int], None] = lambda done, total: None,
+    on_notice: Callable[[str], None] = lambda text: None,
+) -> int:
+    """Do all episodes of `config` that `folder` does not hold yet; returns how many those were.
+
+    `jobs` processes share the work, or the workers of the Dask scheduler at `dask`. `remember` has plans
+    kept, which changes no row. `on_rows` hears how many rows of how many there are. Raises `SweepError`, and
+    `SweepInterrupted` on Ctrl-C.
+    """
+    if not 1 <= jobs <= 1024:
+        raise SweepError(f"{jobs} jobs; valid: 1 to 1024")
+    if dask is not None and jobs != 1:
+        raise SweepError("--jobs is for this machine, --dask for a cluster, which has its workers; give one")
+    work = partial(run_job, config, remember=remember)
+    with _cluster(dask) as client, open_rows(folder, config, command) as rows:
+        before, total = rows.done, config.total
+        on_rows(before, total)
+        if before < total:
+            for planner in config.planners:
+                warm_up(make_planner(planner), on_notice)
+        try:
+            for done in _in_order(config.jobs(before), work, jobs, client):
+                rows.append(done)
+                on_rows(rows.done, total)
+        except KeyboardInterrupt:
+            raise SweepInterrupted(rows.done, total) from None
+        return rows.done - before
+
+
+def _in_order(jobs: Iterable[Job], work: Work, n: int, client: Any) -> Iterator[list[Row]]:
+    if client is not None:
+        return _on_cluster(jobs, work, client)
+    return map(work, jobs) if n == 1 else _in_processes(jobs, work, n)
+
+
+def _in_processes(jobs: Iterable[Job], work: Work, n: int) -> Iterator[list[Row]]:
+    from joblib import Parallel, delayed
+
+    task = delayed(_single_threaded)
+    with _deaf_to_ctrl_c():  # the processes inherit that: Ctrl-C in a terminal goes to all of them
+        results = Parallel(n_jobs=n, return_as="generator", batch_size=1)(task(work, job) for job in jobs)
+    try:
+        yield from results
+    finally:
+        results.close()  # ends the processes, whatever they are at
+
+
+def _single_threaded(work: Work, job: Job) -> list[Row]:
+    """One process per core is enough: planners that share samples out among threads gain nothing here."""
+    os.environ.setdefault("OMP_NUM_THREADS", "1")
+    return work(job)
+
+
+@contextmanager
+def _deaf_to_ctrl_c() -> Iterator[None]:
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _on_cluster(jobs: Iterable[Job], work: Work, client: Any) -> Iterator[list[Row]]:
+    """Keep the workers busy a few jobs ahead; what a lost worker had is done again by another."""
+    remaining = iter(jobs)
+    n = max(len(client.scheduler_info(n_workers=-1)["workers"]), 1) * AHEAD
+    waiting = deque(client.submit(work, job, pure=False) for job in islice(remaining, n))
+    try:
+        while waiting:
+            done = waiting.popleft()
+            rows = _result(done)
+            waiting.extend(client.submit(work, job, pure=False) for job in islice(remaining, 1))
+            yield rows
+    finally:
+        client.cancel(list(waiting))
+
+
+def _result(future: Any) -> list[Row]:
+    from distributed import KilledWorker
+    from distributed.client import FutureCancelledError
+
+    try:
+        rows: list[Row] = future.result()
+        return rows
+    except (KilledWorker, FutureCancelledError, OSError, TimeoutError) as error:
+        raise SweepError(
+            f"the cluster lost its work ({one_line(error, 120)}); finished rows are kept, the same command "
+            "goes on from there"
+        ) from None
+
+
+@contextmanager
+def _cluster(address: str | None) -> Iterator[Any]:
+    """A client of the scheduler at `address`, or None; raises `SweepError` if it cannot be used."""
+    if address is None:
+        yield None
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise SweepError(
+            "--dask takes the package distributed: pip install 'cognitive-arch[cluster]'"
+        ) from None
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, timeout=PATIENCE_S, set_as_default=False)
+    except (OSError, ValueError, TimeoutError) as error:
+        raise SweepError(
+            f"no Dask scheduler answers at {one_line(address)} within {PATIENCE_S} s "
+            f"({one_line(error) or type(error).__name__}); valid: an address such as tcp://127.0.0.1:8786"
+        ) from None
+    try:
+        _check_workers(client, address)
+        yield client
+    finally:
+        client.close(timeout=1)
+
+
+def _check_workers(client: Any, address: str) -> None:
+    """There must be workers, with the same versions: else the rows would not be the same."""
+    theirs = client.run(versions)
+    if not theirs:
+        raise SweepError(f"the Dask scheduler at {one_line(address)} has no workers; start some: dask worker")
+    mine = versions()
+    for worker, found in sorted(theirs.items()):
+        differing = [
+            f"{key} {found.get(key)}, here {mine[key]}" for key in mine if found.get(key) != mine[key]
+        ]
+        if differing:
+            raise SweepError(
+                f"the Dask worker {worker} has other versions: {one_line('; '.join(differing), 200)}"
+            )
