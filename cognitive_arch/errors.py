@@ -46,6 +46,10 @@ class PerceptionError(CogArchError):
     """An image, a camera or what was learned of objects cannot be used."""
 
 
+class AffordanceError(CogArchError):
+    """Trials, a network learned from them, or a question to it cannot be used."""
+
+
 class StoreError(CogArchError):
     """The run store cannot be opened, read or written."""
 

@@ -1,0 +1,120 @@
+"""What functions learned from trials look at: similarity of shapes, and where a thing stands."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.special import ndtr
+
+from cognitive_arch.affordances.trials import EDGES, N_BINS, Floats
+
+MEASUREMENT_SIGMA = 0.015
+"""Metres: how far off a measured displacement may be (two localisations of about a centimetre each)."""
+ROBOT = (0.0, 0.0)
+"""Where the robot stands in its root frame, metres."""
+
+
+def soft_bins(effect: Floats, sigma: float = MEASUREMENT_SIGMA) -> Floats:
+    """p(bin | measured effect) for effects (n,) in metres: (n, 5).
+
+    An effect near an edge counts for both bins, so that a function learned from few trials knows that bins
+    are ordered and where their edges are.
+    """
+    cumulated = ndtr((np.asarray(EDGES)[None] - effect[:, None]) / sigma)
+    padded = np.column_stack([np.zeros(len(effect)), cumulated, np.ones(len(effect))])
+    return np.diff(padded, axis=1).reshape(len(effect), N_BINS)
+
+
+def polar(start: Floats) -> Floats:
+    """Distance (m) and bearing (rad, left is negative) from the robot of places (n, 2); NaN stays NaN."""
+    x, y = start[:, 0] - ROBOT[0], start[:, 1] - ROBOT[1]
+    return np.column_stack([np.hypot(x, y), np.arctan2(y, -x)])
+
+
+@dataclass(frozen=True, eq=False)
+class Scaling:
+    """`(values - centre) / width`, clipped to +-`limit`; NaN becomes 0, the centre."""
+
+    centre: Floats
+    width: Floats
+    limit: float
+
+    @classmethod
+    def of(cls, values: Floats, limit: float, robust: bool = False) -> Scaling:
+        """Centre and width of `values` (n, d): mean and standard deviation, or their robust counterparts
+        (places of things that slipped out of sight are metres away)."""
+        if not np.isfinite(values).any():
+            return cls(np.zeros(values.shape[1]), np.ones(values.shape[1]), limit)
+        if robust:
+            centre = np.nanmedian(values, axis=0)
+            width = 1.4826 * np.nanmedian(np.abs(values - centre), axis=0)
+        else:
+            centre, width = np.nanmean(values, axis=0), np.nanstd(values, axis=0)
+        return cls(centre, np.where(width > 1e-9, width, 1.0), limit)
+
+    def __call__(self, values: Floats) -> Floats:
+        """Scaled values (n, d)."""
+        scaled = np.clip((values - self.centre) / self.width, -self.limit, self.limit)
+        return np.where(np.isnan(scaled), 0.0, scaled)
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"centre": self.centre.tolist(), "width": self.width.tolist(), "limit": self.limit}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Scaling:
+        """From `to_json`."""
+        return cls(np.array(data["centre"]), np.array(data["width"]), float(data["limit"]))
+
+
+@dataclass(frozen=True, eq=False)
+class Similarity:
+    """Features whose inner products are a Gaussian kernel, exact at `centres` (c, d) (Nystroem).
+
+    Something unlike every centre has features near zero: nothing is then known of it beyond what holds for
+    all. `root` (c, c) is the inverse square root of the kernel among the centres.
+    """
+
+    centres: Floats
+    root: Floats
+    length: float
+
+    @classmethod
+    def of(cls, values: Floats, length: float, most: int) -> Similarity:
+        """Centres are the different rows of `values` (n, d), or, if there are more than `most`, the middles
+        of that many clusters."""
+        centres = np.unique(values, axis=0)
+        if len(centres) > most:
+            from sklearn.cluster import KMeans
+
+            centres = KMeans(most, n_init=1, random_state=0).fit(values).cluster_centers_
+        roots, axes = np.linalg.eigh(_kernel(centres, centres, length))
+        return cls(centres, axes / np.sqrt(np.maximum(roots, 1e-6)), length)
+
+    def __call__(self, values: Floats) -> Floats:
+        """Features (n, c) of `values` (n, d)."""
+        features: Floats = _kernel(values, self.centres, self.length) @ self.root
+        return features
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {"centres": self.centres.tolist(), "root": self.root.tolist(), "length": self.length}
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> Similarity:
+        """From `to_json`."""
+        return cls(np.array(data["centres"]), np.array(data["root"]), float(data["length"]))
+
+
+def _kernel(a: Floats, b: Floats, length: float) -> Floats:
+    square = ((a[:, None] - b[None]) ** 2).sum(axis=2)
+    kernel: Floats = np.exp(-0.5 * square / length**2)
+    return kernel
+
+
+def products(a: Floats, b: Floats) -> Floats:
+    """All products of a column of `a` (n, i) with one of `b` (n, j): (n, i * j)."""
+    return (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)

@@ -1,0 +1,207 @@
+"""The default model: a network whose effect nodes have a mixture of learned CPDs.
+
+    p(effect | a, m, o, s) = sum over k of w_k p_k(effect | a, m, o, s)
+
+The parts are the action's own distribution (a Dirichlet estimate), the hierarchical softmax and the ensemble
+of tree CPDs. The weights are found by expectation-maximisation on predictions for trials that the parts have
+not seen: folds of the training trials, by object where there are enough of them, for it is new things that
+the robot asks about. So is one exponent that makes the distributions as sure as they are right, and the
+dependence between the two effects.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, Protocol
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from cognitive_arch.affordances.forest import ForestCPD
+from cognitive_arch.affordances.model import coupled, coupling
+from cognitive_arch.affordances.softmax import SoftmaxCPD
+from cognitive_arch.affordances.trials import ACTIONS, N_BINS, Floats, Ints, TrialTable, joined
+
+FOLDS = 4
+OBJECTS_FOR_FOLDS = 6
+"""With at least so many objects each fold holds out some of them entirely."""
+PLACES = 48
+"""Places kept to average over where the place is not told."""
+
+
+@dataclass(frozen=True, eq=False)
+class ActionCPD:
+    """p(effect | action): `probabilities` (actions, 2, 5)."""
+
+    probabilities: Floats
+
+    @classmethod
+    def fit(cls, table: TrialTable) -> ActionCPD:
+        """Frequencies, with one pseudo-trial spread as the effects of all actions together are."""
+        counts = np.zeros((len(ACTIONS), 2, N_BINS))
+        for axis in range(2):
+            np.add.at(counts[:, axis], (table.action, table.bins[:, axis]), 1.0)
+        overall = counts.sum(axis=0) + 1.0
+        raised = counts + overall / overall.sum(axis=1, keepdims=True)
+        return cls(raised / raised.sum(axis=2, keepdims=True))
+
+    def marginals(self, table: TrialTable) -> Floats:
+        """p(bin) along x and y of each row, (n, 2, 5)."""
+        answer: Floats = self.probabilities[table.action]
+        return answer
+
+
+@dataclass(eq=False)
+class MixtureModel:
+    """`weights` (3,) of the parts, `exponent` (sharper above 1), `ratio` (actions, 5, 5) the
+    dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
+
+    action: ActionCPD
+    softmax: SoftmaxCPD
+    forest: ForestCPD
+    weights: Floats
+    exponent: float
+    ratio: Floats
+    places: Floats
+    seen: TrialTable | None = None
+
+    @classmethod
+    def fit(cls, table: TrialTable, rng: np.random.Generator) -> MixtureModel:
+        """Learn parts, weights, exponent and dependence from `table` alone."""
+        parts = _fit_parts(table, rng)
+        held_out = _held_out(table, rng, parts[1])
+        weights = _weights(held_out, table.bins)
+        mixed = np.einsum("k,knxb->nxb", weights, held_out)
+        exponent = _exponent(mixed, table.bins)
+        ratio = coupling(_sharpened(mixed, exponent), table)
+        places = table.start[np.isfinite(table.start).all(axis=1)]
+        if len(places) > PLACES:
+            places = places[rng.choice(len(places), PLACES, replace=False)]
+        return cls(*parts, weights, exponent, ratio, places, table)
+
+    def joint(self, table: TrialTable) -> Floats:
+        """See `EffectModel`."""
+        unknown = np.asarray(np.isnan(table.start).any(axis=1))
+        if not (len(self.places) and unknown.any()):
+            return self._joint(table)
+        answer = np.zeros((len(table), N_BINS, N_BINS))
+        if not unknown.all():
+            answer[~unknown] = self._joint(table.take(~unknown))
+        part = table.take(unknown)
+        # p(E | A, M, O) sums over where things use to stand.
+        spread = part.take(np.repeat(np.arange(len(part)), len(self.places)))
+        spread = replace(spread, start=np.tile(self.places, (len(part), 1)))
+        answer[unknown] = self._joint(spread).reshape(len(part), -1, N_BINS, N_BINS).mean(axis=1)
+        return answer
+
+    def _joint(self, table: TrialTable) -> Floats:
+        parts: Sequence[Marginals] = (self.action, self.softmax, self.forest)
+        each = np.stack([part.marginals(table) for part in parts])
+        mixed = _sharpened(np.einsum("k,knxb->nxb", self.weights, each), self.exponent)
+        return coupled(mixed, self.ratio[table.action])
+
+    def update(self, table: TrialTable, rng: np.random.Generator) -> None:
+        """Further trials: the parts are learned again from all trials, the weights stay as they are.
+
+        A model that was loaded from a file has no trials: give it those it was learned from.
+        """
+        self.seen = table if self.seen is None else joined([self.seen, table])
+        self.action, self.softmax, self.forest = _fit_parts(self.seen, rng, self.softmax)
+
+    def to_json(self) -> dict[str, Any]:
+        """See `EffectModel`; the trials themselves are left out."""
+        return {
+            "action": self.action.probabilities.tolist(),
+            "softmax": self.softmax.to_json(),
+            "forest": self.forest.to_json(),
+            "weights": self.weights.tolist(),
+            "exponent": self.exponent,
+            "ratio": self.ratio.tolist(),
+            "places": self.places.tolist(),
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> MixtureModel:
+        """See `EffectModel`."""
+        return cls(
+            ActionCPD(np.array(data["action"])),
+            SoftmaxCPD.from_json(data["softmax"]),
+            ForestCPD.from_json(data["forest"]),
+            np.array(data["weights"]),
+            float(data["exponent"]),
+            np.array(data["ratio"]),
+            np.array(data["places"]).reshape(-1, 2),
+        )
+
+
+class Marginals(Protocol):
+    """What every part can do."""
+
+    def marginals(self, table: TrialTable) -> Floats:
+        """p(bin) along x and y of each row, (n, 2, 5)."""
+
+
+Parts = tuple[ActionCPD, SoftmaxCPD, ForestCPD]
+
+
+def _fit_parts(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD | None = None) -> Parts:
+    return (
+        ActionCPD.fit(table),
+        SoftmaxCPD.fit(table, start=guess),
+        ForestCPD.fit(table, rng),
+    )
+
+
+def _folds(table: TrialTable, rng: np.random.Generator) -> Ints:
+    """Which fold each row belongs to, (n,): rows of one trial, or of one object, belong to the same."""
+    objects = np.unique(table.object)
+    groups = table.object if len(objects) >= OBJECTS_FOR_FOLDS else table.trial
+    names, which = np.unique(groups, return_inverse=True)
+    fold: Ints = (rng.permutation(len(names)) % FOLDS)[which]
+    return fold
+
+
+def _held_out(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD) -> Floats:
+    """Predictions of each part for each row by parts that were not shown it, (3, n, 2, 5)."""
+    fold = _folds(table, rng)
+    answer = np.full((3, len(table), 2, N_BINS), 1 / N_BINS)
+    for k in range(FOLDS):
+        out = fold == k
+        if out.any() and not out.all():
+            rest = table.take(~out)
+            parts: Sequence[Marginals] = _fit_parts(rest, rng, guess)
+            for i, part in enumerate(parts):
+                answer[i, out] = part.marginals(table.take(out))
+    return answer
+
+
+def _weights(held_out: Floats, bins: Ints, steps: int = 100) -> Floats:
+    """Weights of the mixture by expectation-maximisation, with one pseudo-trial for each part."""
+    rows = np.arange(len(bins))
+    likelihood = np.stack([held_out[:, rows, axis, bins[:, axis]] for axis in range(2)], axis=2).reshape(
+        len(held_out), -1
+    )
+    weights = np.full(len(held_out), 1 / len(held_out))
+    for _ in range(steps):
+        joint = weights[:, None] * likelihood
+        weights = (joint / joint.sum(axis=0)).sum(axis=1) + 1.0
+        weights /= weights.sum()
+    return weights
+
+
+def _sharpened(marginals: Floats, exponent: float) -> Floats:
+    raised = marginals**exponent
+    sharpened: Floats = raised / raised.sum(axis=2, keepdims=True)
+    return sharpened
+
+
+def _exponent(marginals: Floats, bins: Ints) -> float:
+    """The exponent under which the held-out bins are most likely."""
+    rows = np.arange(len(bins))
+
+    def loss(log_exponent: float) -> float:
+        p = _sharpened(marginals, float(np.exp(log_exponent)))
+        return -sum(float(np.log(p[rows, axis, bins[:, axis]] + 1e-12).sum()) for axis in range(2))
+
+    return float(np.exp(minimize_scalar(loss, bounds=(-0.7, 0.7), method="bounded").x))

@@ -1,0 +1,119 @@
+"""Models by their names; saved and loaded as JSON."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cognitive_arch.affordances.baselines import ForestModel, LogisticModel, MajorityModel
+from cognitive_arch.affordances.mixture import MixtureModel
+from cognitive_arch.affordances.model import EffectModel
+from cognitive_arch.affordances.networks import METHODS, network_class
+from cognitive_arch.affordances.trials import Floats, Names, TrialTable, checked
+from cognitive_arch.errors import AffordanceError, one_line, unknown
+
+DEFAULT = "default"
+MODELS: Mapping[str, type[Any]] = {
+    DEFAULT: MixtureModel,
+    **{method: network_class(method) for method in METHODS},
+    "majority": MajorityModel,
+    "forest": ForestModel,
+    "logistic": LogisticModel,
+}
+BASELINES = ("majority", "forest", "logistic")
+FORMAT = "cogarch-affordances-1"
+
+
+@dataclass(eq=False)
+class Affordances:
+    """A model, what it is called, and what it was learned from: the things it knows by name.
+
+    `things_m` and `things_o` are mean descriptors by name; `trials` says how many there were.
+    """
+
+    name: str
+    model: EffectModel
+    names_m: tuple[str, ...]
+    names_o: tuple[str, ...]
+    things_m: Mapping[str, Floats]
+    things_o: Mapping[str, Floats]
+    trials: int
+    source: str
+
+    @classmethod
+    def learn(cls, table: TrialTable, name: str, rng: np.random.Generator) -> Affordances:
+        """Learn the model `name` from trials. Raises `AffordanceError` for names there are not."""
+        checked(table)
+        model = model_class(name).fit(table, rng)
+        return cls(
+            name,
+            model,
+            table.names_m,
+            table.names_o,
+            {
+                str(n): table.shape_m[table.manipulator == n].mean(axis=0)
+                for n in np.unique(table.manipulator)
+            },
+            {str(n): table.shape_o[table.object == n].mean(axis=0) for n in np.unique(table.object)},
+            len(np.unique(table.trial)),
+            table.source,
+        )
+
+    def save(self, path: Path | str) -> None:
+        """Write everything as JSON."""
+        data = {
+            "format": FORMAT,
+            "model": self.name,
+            "names_m": list(self.names_m),
+            "names_o": list(self.names_o),
+            "things_m": {n: v.tolist() for n, v in self.things_m.items()},
+            "things_o": {n: v.tolist() for n, v in self.things_o.items()},
+            "trials": self.trials,
+            "source": self.source,
+            "parameters": self.model.to_json(),
+        }
+        Path(path).write_text(json.dumps(data) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: Path | str) -> Affordances:
+        """Read what `save` wrote; raises `AffordanceError` for anything else."""
+        path = Path(path)
+        try:
+            data = json.loads(path.read_text(encoding="utf-8"))
+        except OSError:
+            raise AffordanceError(f"there is no learned model at '{one_line(path)}'") from None
+        except ValueError as error:
+            raise AffordanceError(f"'{one_line(path.name)}' is no learned model: {one_line(error)}") from None
+        if not isinstance(data, dict) or data.get("format") != FORMAT:
+            raise AffordanceError(
+                f"'{one_line(path.name)}' is no learned model; valid: a file of `cogarch learn networks`"
+            )
+        try:
+            return cls(
+                data["model"],
+                model_class(data["model"]).from_json(data["parameters"]),
+                tuple(data["names_m"]),
+                tuple(data["names_o"]),
+                {n: np.array(v) for n, v in data["things_m"].items()},
+                {n: np.array(v) for n, v in data["things_o"].items()},
+                int(data["trials"]),
+                str(data["source"]),
+            )
+        except (KeyError, TypeError, ValueError) as error:
+            raise AffordanceError(f"'{one_line(path.name)}' is incomplete: {one_line(error)}") from None
+
+
+def _means(names: Names, shapes: Floats) -> dict[str, Floats]:
+    return {str(name): shapes[names == name].mean(axis=0) for name in np.unique(names)}
+
+
+def model_class(name: str) -> type[Any]:
+    """The class of a model; raises `AffordanceError` for a name there is not."""
+    if name not in MODELS:
+        raise AffordanceError(unknown("model", name, MODELS))
+    return MODELS[name]
