@@ -121,10 +121,20 @@ class Renderer:
         image = query.RenderDepthImage(wanted, self._graph.world_frame_id(), X_WC)
         return np.array(image.data[:, :, 0], dtype=np.float32)
 
+    def labels(self, context: Context, camera: Camera) -> NDArray[np.int16]:
+        """Which body is seen in every pixel: its index in the plant. For making examples, not for seeing."""
+        wanted = ColorRenderCamera(_core(camera), False)
+        query, X_WC = self._query(context), RigidTransform(camera.X_WC)
+        image = query.RenderLabelImage(wanted, self._graph.world_frame_id(), X_WC)
+        return np.array(image.data[:, :, 0], dtype=np.int16)
+
     def _query(self, context: Context) -> QueryObject:
         return self._graph.get_query_output_port().Eval(self._graph.GetMyContextFromRoot(context))
 
 
 def _core(camera: Camera) -> RenderCameraCore:
-    lens = CameraInfo(*camera.size, camera.focal, camera.focal, *camera.centre)
+    # The renderer counts from the corner of the first pixel, the camera from its middle: without this
+    # every place on the table would be off by a millimetre.
+    x, y = (coordinate + 0.5 for coordinate in camera.centre)
+    lens = CameraInfo(*camera.size, camera.focal, camera.focal, x, y)
     return RenderCameraCore(RENDERER, lens, ClippingRange(0.02, 6.0), RigidTransform())

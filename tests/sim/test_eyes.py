@@ -45,6 +45,15 @@ def test_depth_tells_where_things_are(seen: EyeImage, world: World) -> None:
         assert np.allclose(points[row, column], top, atol=0.003), name
 
 
+def test_pixels_and_places_agree_to_a_fraction_of_a_pixel(seen: EyeImage, world: World) -> None:
+    """Half a pixel off, and the table would seem tilted and a third of a millimetre too high."""
+    heights = seen.camera.points(seen.depth)[:, :, 2]
+    table = (np.abs(heights - world.scene.table.height) < 0.002) & ~seen.own
+    assert table.mean() > 0.3
+    # Sides of things that stand on it count, too: they are few.
+    assert np.quantile(np.abs(heights[table] - world.scene.table.height), 0.95) < 1e-5
+
+
 def test_colour_and_depth_have_one_pose(seen: EyeImage, world: World) -> None:
     """The tomato is where it is red, and where the depth is above the table."""
     x, y, _ = world.pose("Tomato").translation()
