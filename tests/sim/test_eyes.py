@@ -17,6 +17,10 @@ def world() -> World:
     scene = load_scene("complex")
     world = World(load_domain(scene.domain), scene)
     world.reset(scene.objects)
+    # Both hands over the table, in view.
+    for side in ("l", "r"):
+        world.home[world.joint_names.index(f"{side}_shoulder_yaw")] = 0.3
+    world.reset(scene.objects)
     return world
 
 
