@@ -185,10 +185,14 @@ def halves(blob: NDArray[np.uint8], whole: Outline) -> tuple[Outline, Outline]:
     rectangle = whole.rectangle
     x, y = rectangle.up
     height, width = blob.shape
-    # How far each pixel lies above the cut: one part per column, one per row.
-    above = np.add.outer(y * np.arange(height), x * np.arange(width) - rectangle.middle)
-    top = (above >= -ON_THE_CUT).view(np.uint8) & blob
-    bottom = (above <= ON_THE_CUT).view(np.uint8) & blob
+    # How far a pixel lies above the cut is a sum of one part per column and one per row. Comparing the parts
+    # saves a matrix of their sums, which would be eight times as large as the image.
+    columns = x * np.arange(width) - rectangle.middle
+    rows = -y * np.arange(height)[:, None]
+    top = (columns >= rows - ON_THE_CUT).view(np.uint8)
+    bottom = (columns <= rows + ON_THE_CUT).view(np.uint8)
+    top &= blob
+    bottom &= blob
     return outline(top, rectangle.up), outline(bottom, rectangle.up)
 
 
