@@ -12,7 +12,6 @@ from cognitive_arch.verbs.common import Json, SeedOption, print_answer
 
 app = typer.Typer(
     help="Learn again from examples: what objects look like.",
-    no_args_is_help=True,
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
