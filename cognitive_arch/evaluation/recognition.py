@@ -12,11 +12,12 @@ from cognitive_arch.domain import load_domain
 from cognitive_arch.errors import PerceptionError, one_line
 from cognitive_arch.execution.backends import drake_module
 from cognitive_arch.perception.recognition import UNKNOWN, ObjectRecogniser, digest, recogniser_path
-from cognitive_arch.perception.recognition_training import describe, fit
+from cognitive_arch.perception.recognition_training import calibrate, describe, fit
 
 VARIANTS = 2  # in which every view is learnt from besides itself
 VIEWS = (20, 20_000)  # that may be asked for
-TEST_SHARE, TEST_SEED = 8, 99  # one test view for so many to learn from; added to the seed
+HELD_OUT = 8  # views to learn from for every one to test with, and for every one to calibrate with
+TEST_SEED, CALIBRATION_SEED = 99, 55  # added to the seed
 TO_LEARN = 0.5  # of a stranger must be in view to learn from it: a part of one may look like anything
 MOSTLY = 0.8  # of a thing is in view where it counts as a view to recognise it from
 HALF = 0.5  # the same for the harder test, told beside it
@@ -49,7 +50,11 @@ def learn_objects(
     command = f"cogarch learn objects --domain {domain_name} --views {views} --seed {seed}"
     told = {"domain": domain_name, "command": command, "views": views, "seed": seed, "looks": digest(domain)}
     recogniser = fit(learnt, sorted(domain.objects), told, seed)
-    held_out = -(-views // TEST_SHARE)
+    held_out = -(-views // HELD_OUT)
+    progress(f"weighing known against unknown on {held_out} views")
+    weighed = render(domain, held_out, np.random.default_rng(seed + CALIBRATION_SEED))
+    chosen = ((e.image, e.mask, e.name) for e in weighed if e.visible >= MOSTLY)
+    calibrate(recogniser, describe(chosen, np.random.default_rng(seed)))
     progress(f"testing on {held_out} views with strangers of other kinds")
     tested = render(domain, held_out, np.random.default_rng(seed + TEST_SEED), test=True)
     scores = score(recogniser, tested)

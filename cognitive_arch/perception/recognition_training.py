@@ -24,7 +24,10 @@ FEWEST = 20  # examples of every name
 KEPT_PIXELS = 50  # of a region that was cut
 CUT = 0.25  # share of the variants that something hides a part of
 SURE, LIMIT_FACTOR = 0.998, 1.15  # this share of an object's examples is within its limit; and some more room
-STRANGERS = 0.2  # share of unknown things that is expected on a table; among the examples there are more
+KNOWN_RIGHT = (
+    0.994  # share of known things that must keep their name; then as few strangers get one as can be
+)
+READINESS = np.linspace(-4.0, 1.0, 51)  # of which one is added to the score of unknown
 RIDGE = 1e-5  # added to variances of colours: what never varied is not known to the last digit
 
 
@@ -117,14 +120,28 @@ def fit(labelled: Labelled, objects: Sequence[str], told: Mapping[str, Any], see
     trees.fit(labelled.features, order)
     means, whitenings = _spreads(labelled.features, order, len(names) - 1)
     ones = np.ones(len(names) - 1, np.float32)
-    forest = _forest(trees)
-    share = float(np.mean(given == UNKNOWN))
-    forest.start[-1] += np.log(STRANGERS / (1 - STRANGERS)) - np.log(share / (1 - share))
-    recogniser = ObjectRecogniser(names, forest, means, whitenings, ones, dict(told))
+    recogniser = ObjectRecogniser(names, _forest(trees), means, whitenings, ones, dict(told))
     for n in range(len(names) - 1):
         own = [recogniser.color_distances(each)[n] for each in labelled.features[order == n]]
         recogniser.limits[n] = LIMIT_FACTOR * np.quantile(own, SURE)
     return recogniser
+
+
+def calibrate(recogniser: ObjectRecogniser, labelled: Labelled) -> None:
+    """Make the recogniser as ready to say "unknown" as it can be while `KNOWN_RIGHT` of the known things
+    among these examples, which it has not learnt from, are still called by their names."""
+    known = [n for n, name in enumerate(labelled.names) if name != UNKNOWN]
+    if not known:
+        raise PerceptionError("there is nothing to calibrate with: no view shows a known thing")
+    right = np.array([recogniser.names.index(labelled.names[n]) for n in known])
+    likely = np.array([recogniser.probabilities(labelled.features[n]) for n in known])
+    chosen = READINESS[0]
+    for more in READINESS:
+        weighed = likely * np.exp(np.append(np.zeros(likely.shape[1] - 1), more))
+        if np.mean(weighed.argmax(axis=1) == right) < KNOWN_RIGHT:
+            break
+        chosen = more
+    recogniser.forest.start[-1] += chosen
 
 
 def _forest(trees: HistGradientBoostingClassifier) -> Forest:

@@ -21,7 +21,7 @@ from cognitive_arch.perception.recognition import (
     load_recogniser,
     recogniser_path,
 )
-from cognitive_arch.perception.recognition_training import describe, fit
+from cognitive_arch.perception.recognition_training import KNOWN_RIGHT, calibrate, describe, fit
 
 COLORS = {"Red": (200, 40, 30), "Blue": (40, 60, 200), UNKNOWN: (60, 180, 60)}
 
@@ -168,6 +168,22 @@ def test_same_examples_same_recogniser(recogniser: ObjectRecogniser, tmp_path: P
     loaded = ObjectRecogniser.load(tmp_path / "two.npz")
     assert loaded.classify(image, mask) == recogniser.classify(image, mask)
     assert loaded.told["command"] == "by hand"
+
+
+def test_unknown_is_said_as_readily_as_known_things_allow() -> None:
+    learnt = describe(pictures(60, 0), np.random.default_rng(1), 1)
+    ready = fit(learnt, ["Red", "Blue"], {}, 0)
+    before = ready.forest.start[-1]
+    held_out = describe(pictures(60, 12), np.random.default_rng(2))
+    calibrate(ready, held_out)
+    assert ready.forest.start[-1] != before
+    names = np.array(held_out.names)
+    answers = np.array([ready.names[ready.probabilities(f).argmax()] for f in held_out.features])
+    known = names != UNKNOWN
+    assert np.mean(answers[known] == names[known]) >= KNOWN_RIGHT
+    assert np.mean(answers[~known] == UNKNOWN) > 0.95
+    with pytest.raises(PerceptionError, match="nothing to calibrate with"):
+        calibrate(ready, describe([p for p in pictures(3, 0) if p[2] == UNKNOWN], np.random.default_rng(0)))
 
 
 def test_too_few_examples() -> None:
