@@ -42,6 +42,7 @@ lint: setup
 bench: setup
 	$(PY) benchmarks/run.py
 	$(PY) -m benchmarks.planner
+	$(PY) -m benchmarks.perception
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

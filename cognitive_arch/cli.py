@@ -16,7 +16,7 @@ import typer
 
 from cognitive_arch import __version__
 from cognitive_arch.errors import CogArchError, ConfigError, one_line
-from cognitive_arch.verbs import learn, sweeps
+from cognitive_arch.verbs import learn, seeing, sweeps
 from cognitive_arch.verbs.common import (
     Json,
     PlannerOption,
@@ -280,6 +280,7 @@ def inspect(
 
 sweeps.register(app)
 app.add_typer(learn.app, name="learn")
+seeing.register(app)
 
 
 def main() -> None:

@@ -1,0 +1,176 @@
+"""What seeing costs and how right it is: `python -m benchmarks.perception [--what speed,masks] [--data DIR]`.
+
+DIR holds the published data; else it is `$COGARCH_DATA` or `../shared/data`. Times are medians of processor
+time on one core, after a warm-up; nothing here can fail a test. A section is a function that yields rows,
+and a line in `SECTIONS`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import statistics
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks import published_descriptors
+from cognitive_arch.perception.images import read_image, read_mask
+from cognitive_arch.perception.labelling import label_blobs
+from cognitive_arch.perception.segmentation import FOR_PLAIN_IMAGES, make_segmenter
+from cognitive_arch.perception.vision import see
+
+ROOT = Path(__file__).resolve().parents[1]
+TABLE = (170, 136, 102)
+SEED = 0
+MARGIN = 2  # pixels that the published masks are wider than the things in them
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of the table."""
+
+    what: str
+    measured: str
+    budget: str = ""
+
+
+def six_objects(size: tuple[int, int]) -> NDArray[np.uint8]:
+    """A table with six objects of several forms, slightly noisy: (height, width, 3) RGB for `size` (width,
+    height) in pixels."""
+    width, height = size
+    unit = height / 480
+    image = np.full((height, width, 3), TABLE, np.uint8)
+
+    def at(x: float, y: float) -> tuple[int, int]:
+        return round(x * unit), round(y * unit)
+
+    cv2.circle(image, at(120, 110), round(34 * unit), (230, 40, 30), cv2.FILLED, cv2.LINE_AA)
+    cv2.circle(image, at(330, 100), round(40 * unit), (250, 140, 160), cv2.FILLED, cv2.LINE_AA)
+    cv2.rectangle(image, at(470, 60), at(550, 140), (250, 225, 50), cv2.FILLED)
+    axes = (round(60 * unit), round(28 * unit))
+    cv2.ellipse(image, at(150, 330), axes, 30, 0, 360, (40, 90, 210), cv2.FILLED, cv2.LINE_AA)
+    rake = [
+        at(*p) for p in ((300, 260), (440, 260), (440, 280), (380, 280), (380, 440), (360, 440), (360, 280))
+    ]
+    cv2.fillPoly(image, [np.array([*rake, at(300, 280)], np.int32)], (60, 110, 40), cv2.LINE_AA)
+    t = np.arange(10) * np.pi / 5
+    radius = np.where(np.arange(10) % 2, 26, 58)
+    star = np.column_stack([530 + radius * np.cos(t), 340 + radius * np.sin(t)]) * unit
+    cv2.fillPoly(image, [star.astype(np.int32)], (150, 30, 160), cv2.LINE_AA)
+    noise = np.random.default_rng(SEED).normal(0, 2, image.shape)
+    return np.clip(np.rint(image + noise), 0, 255).astype(np.uint8)
+
+
+def median_ms(work: Callable[[], object], repeat: int = 100) -> float:
+    """Median milliseconds of processor time of `work`, the first tenth left out."""
+    times = []
+    for _ in range(repeat + repeat // 10):
+        started = time.process_time()
+        work()
+        times.append(time.process_time() - started)
+    return 1e3 * statistics.median(times[repeat // 10 :])
+
+
+def speed(_: Path) -> Iterator[Row]:
+    """How long it takes from an image to blobs with descriptors, and of what that consists."""
+    threads = cv2.getNumThreads()
+    cv2.setNumThreads(1)
+    try:
+        for size, budget in (((640, 480), 3.0), ((320, 240), 1.0)):
+            image = six_objects(size)
+            for name in FOR_PLAIN_IMAGES:
+                segmenter = make_segmenter(name)
+                mask = segmenter.segment(image)
+                blobs = len(see(image, segmenter))
+                whole = median_ms(lambda s=segmenter, i=image: see(i, s))  # type: ignore[misc]
+                cut = median_ms(lambda s=segmenter, i=image: s.segment(i))  # type: ignore[misc]
+                label = median_ms(lambda m=mask: label_blobs(m))  # type: ignore[misc]
+                told = f"{size[0]}x{size[1]}, {name}, {blobs} blobs: all"
+                yield Row(told, f"{whole:.2f} ms", f"<= {budget:g} ms" if name == "colour" else "")
+                yield Row("  segmentation", f"{cut:.2f} ms")
+                yield Row("  labelling", f"{label:.2f} ms")
+                yield Row("  descriptors of wholes and halves", f"{whole - cut - label:.2f} ms")
+        yield _video()
+    finally:
+        cv2.setNumThreads(threads)
+
+
+def _video() -> Row:
+    """The share of one core that 30 pictures a second take, by processor time."""
+    image, segmenter, frames = six_objects((640, 480)), make_segmenter(), 90
+    started = time.process_time()
+    for _ in range(frames):
+        see(image, segmenter)
+    share = 30 * (time.process_time() - started) / frames
+    return Row("640x480 at 30 frames a second, of one core", f"{100 * share:.1f} %", "<= 15 %")
+
+
+def overlap(one: NDArray[np.bool_], other: NDArray[np.bool_]) -> float:
+    """Intersection over union of two masks, 1 where both are empty."""
+    union = np.count_nonzero(one | other)
+    return float(np.count_nonzero(one & other) / union) if union else 1.0
+
+
+def masks(data: Path) -> Iterator[Row]:
+    """How far our masks and the published foreground are the same."""
+    paths = sorted((data / "affordances" / "images").glob("*_FG.jpg"))
+    if not paths:
+        yield Row(f"no published pictures in {data}", "-")
+        return
+    pictures = [(read_image(p.with_name(p.name.replace("_FG", ""))), p) for p in paths]
+    pairs = [(i, read_mask(p, (i.shape[1], i.shape[0]))) for i, p in pictures]
+    for name in FOR_PLAIN_IMAGES:
+        for margin in (0, MARGIN):
+            segmenter = make_segmenter(name, margin=margin)
+            found = [overlap(label_blobs(segmenter.segment(i)).labels > 0, m) for i, m in pairs]
+            budget = ">= 0.85" if name == "colour" and margin else ""
+            told = f"mean overlap, {len(pairs)} published masks, {name}, margin {margin}"
+            yield Row(told, f"{statistics.mean(found):.3f}", budget)
+            yield Row("  median", f"{statistics.median(found):.3f}")
+
+
+def shapes(data: Path) -> Iterator[Row]:
+    """How near the descriptors of the same objects are to the published ones, by their medians."""
+    folder = data / "affordances"
+    if not (folder / "images").is_dir():
+        yield Row(f"no published descriptors in {data}", "-")
+        return
+    found = published_descriptors.compare(folder)
+    for formulas in dict.fromkeys(row.formulas for row in found):
+        rows = [row for row in found if row.formulas == formulas]
+        off = statistics.mean(abs(row.ours[0] - row.published[0]) for row in rows)
+        within = statistics.mean(row.within for row in rows)
+        objects = len({row.thing for row in rows})
+        yield Row(f"{formulas}, {objects} objects: mean difference of medians", f"{off:.3f}")
+        yield Row("  ours within the published range", f"{within:.0%}")
+
+
+SECTIONS: dict[str, Callable[[Path], Iterator[Row]]] = {"speed": speed, "masks": masks, "shapes": shapes}
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0] if __doc__ else None)
+    parser.add_argument("--what", help=f"a comma list of {', '.join(SECTIONS)}")
+    parser.add_argument(
+        "--data", type=Path, default=Path(os.environ.get("COGARCH_DATA", ROOT.parent / "shared" / "data"))
+    )
+    options = parser.parse_args(arguments)
+    names = options.what.split(",") if options.what else list(SECTIONS)
+    for name in names:
+        if name not in SECTIONS:
+            parser.error(f"unknown section '{name}'; valid: {', '.join(SECTIONS)}")
+    print(f"{'what':<66} {'measured':>10}   budget", flush=True)
+    for name in names:
+        for row in SECTIONS[name](options.data):
+            print(f"{row.what:<66} {row.measured:>10}   {row.budget}".rstrip(), flush=True)
+
+
+if __name__ == "__main__":
+    main()
