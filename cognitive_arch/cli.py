@@ -16,7 +16,7 @@ import typer
 
 from cognitive_arch import __version__
 from cognitive_arch.errors import CogArchError, ConfigError, one_line
-from cognitive_arch.verbs import learn, seeing, sweeps
+from cognitive_arch.verbs import learn, query, seeing, sweeps
 from cognitive_arch.verbs.common import (
     Json,
     PlannerOption,
@@ -278,6 +278,7 @@ def inspect(
     print_answer(view.data, view.text, as_json)
 
 
+query.register(app)
 sweeps.register(app)
 app.add_typer(learn.app, name="learn")
 seeing.register(app)

@@ -149,7 +149,7 @@ BAD = [
     (["inspect", "--video", "x.mp4"], "--video needs a run"),
     (["inspect", "latest", "--video", "x.gif"], ".mp4"),
     (["inspect", "latest", "--video", "x.mp4"], "there is no run store"),
-    (["fly"], "inspect, learn, parse, plan, reproduce, run, see"),
+    (["fly"], "reproduce, run, see"),
     (["inspect"], "there is no run store"),
     (["inspect", "latest", "--format", "xml"], "valid: jsonl, text"),
     (["inspect", "--step", "1"], "name a run"),

@@ -94,6 +94,11 @@ class Similarity:
         roots, axes = np.linalg.eigh(_kernel(centres, centres, length))
         return cls(centres, axes / np.sqrt(np.maximum(roots, 1e-6)), length)
 
+    def nearest(self, values: Floats) -> Floats:
+        """The likeness of `values` (n, d) to the centre that is most like them, (n,), 0..1."""
+        best: Floats = _kernel(values, self.centres, self.length).max(axis=1)
+        return best
+
     def __call__(self, values: Floats) -> Floats:
         """Features (n, c) of `values` (n, d)."""
         features: Floats = _kernel(values, self.centres, self.length) @ self.root

@@ -16,6 +16,7 @@ from cognitive_arch.affordances.features import polar, soft_bins
 from cognitive_arch.affordances.trials import ACTIONS, N_BINS, Floats, Ints, TrialTable
 
 LEAF = -1
+TREES = 64
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +34,7 @@ class ForestCPD:
     with_start: bool
 
     @classmethod
-    def fit(cls, table: TrialTable, rng: np.random.Generator, trees: int = 100, leaf: int = 3) -> ForestCPD:
+    def fit(cls, table: TrialTable, rng: np.random.Generator, trees: int = TREES, leaf: int = 3) -> ForestCPD:
         """Grow trees with at least `leaf` trials in every leaf on both axes at once."""
         from sklearn.ensemble import RandomForestRegressor
 

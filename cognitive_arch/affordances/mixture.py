@@ -11,14 +11,14 @@ dependence between the two effects.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from cognitive_arch.affordances.forest import ForestCPD
+from cognitive_arch.affordances.forest import TREES, ForestCPD
 from cognitive_arch.affordances.model import coupled, coupling
 from cognitive_arch.affordances.softmax import SoftmaxCPD
 from cognitive_arch.affordances.trials import ACTIONS, N_BINS, Floats, Ints, TrialTable, joined
@@ -26,6 +26,8 @@ from cognitive_arch.affordances.trials import ACTIONS, N_BINS, Floats, Ints, Tri
 FOLDS = 4
 OBJECTS_FOR_FOLDS = 6
 """With at least so many objects each fold holds out some of them entirely."""
+MOST_ROWS = 4000
+TREES_FOR_WEIGHTS = 24
 PLACES = 48
 """Places kept to average over where the place is not told."""
 
@@ -68,7 +70,12 @@ class MixtureModel:
 
     @classmethod
     def fit(cls, table: TrialTable, rng: np.random.Generator) -> MixtureModel:
-        """Learn parts, weights, exponent and dependence from `table` alone."""
+        """Learn parts, weights, exponent and dependence from `table` alone.
+
+        Of more than `MOST_ROWS` rows (mostly views of the same trials) as many are drawn.
+        """
+        if len(table) > MOST_ROWS:
+            table = table.take(np.sort(rng.choice(len(table), MOST_ROWS, replace=False)))
         parts = _fit_parts(table, rng)
         held_out = _held_out(table, rng, parts[1])
         weights = _weights(held_out, table.bins)
@@ -82,7 +89,8 @@ class MixtureModel:
 
     def joint(self, table: TrialTable) -> Floats:
         """See `EffectModel`."""
-        unknown = np.asarray(np.isnan(table.start).any(axis=1))
+        # A place farther out than those tried tells as little as one that is not told.
+        unknown = np.asarray(~self.softmax.within(table.start))
         if not (len(self.places) and unknown.any()):
             return self._joint(table)
         answer = np.zeros((len(table), N_BINS, N_BINS))
@@ -96,8 +104,7 @@ class MixtureModel:
         return answer
 
     def _joint(self, table: TrialTable) -> Floats:
-        parts: Sequence[Marginals] = (self.action, self.softmax, self.forest)
-        each = np.stack([part.marginals(table) for part in parts])
+        each = _marginals((self.action, self.softmax, self.forest), table)
         mixed = _sharpened(np.einsum("k,knxb->nxb", self.weights, each), self.exponent)
         return coupled(mixed, self.ratio[table.action])
 
@@ -135,22 +142,28 @@ class MixtureModel:
         )
 
 
-class Marginals(Protocol):
-    """What every part can do."""
-
-    def marginals(self, table: TrialTable) -> Floats:
-        """p(bin) along x and y of each row, (n, 2, 5)."""
-
-
 Parts = tuple[ActionCPD, SoftmaxCPD, ForestCPD]
 
 
-def _fit_parts(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD | None = None) -> Parts:
+def _fit_parts(
+    table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD | None = None, trees: int = TREES
+) -> Parts:
     return (
         ActionCPD.fit(table),
         SoftmaxCPD.fit(table, start=guess),
-        ForestCPD.fit(table, rng),
+        ForestCPD.fit(table, rng, trees),
     )
+
+
+def _marginals(parts: Parts, table: TrialTable) -> Floats:
+    """p(bin) of each part along x and y of each row, (3, n, 2, 5).
+
+    Trees take what is unlike anything they were shown for the nearest of it, be it ever so far. They are
+    trusted as far as the things are familiar; beyond that the softmax speaks, which then knows averages only.
+    """
+    action, soft, forest = (part.marginals(table) for part in parts)
+    trust = parts[1].familiarity(table)[:, None, None]
+    return np.stack([action, soft, trust * forest + (1 - trust) * soft])
 
 
 def _folds(table: TrialTable, rng: np.random.Generator) -> Ints:
@@ -170,9 +183,7 @@ def _held_out(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD) ->
         out = fold == k
         if out.any() and not out.all():
             rest = table.take(~out)
-            parts: Sequence[Marginals] = _fit_parts(rest, rng, guess)
-            for i, part in enumerate(parts):
-                answer[i, out] = part.marginals(table.take(out))
+            answer[:, out] = _marginals(_fit_parts(rest, rng, guess, TREES_FOR_WEIGHTS), table.take(out))
     return answer
 
 

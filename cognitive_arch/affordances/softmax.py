@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import log_softmax, softmax
 
@@ -28,8 +29,9 @@ LIKENESS = 1.4
 class Priors:
     """Prior widths (standard deviations of weights), length scales and sizes.
 
-    Manipulators are few and matter most; objects matter less, and a shorter length keeps one that was never
-    tried near the average of all. Within these orders of magnitude results hardly change with the values.
+    Manipulators are few and matter most, and what was learned of one carries far; objects matter less, and a
+    shorter length keeps one that was never tried near the average of all. Within these orders of magnitude
+    results hardly change with the values.
     """
 
     action: float = 3.0
@@ -38,7 +40,7 @@ class Priors:
     start: float = 0.5
     shared: float = 0.7
     interplay: float = 0.5
-    length_m: float = 1.0
+    length_m: float = 2.0
     length_o: float = 0.5
     length_s: float = 1.0
     centres: int = 12
@@ -115,6 +117,17 @@ class SoftmaxCPD:
             np.concatenate([shared for _, shared in widths]),
         )
 
+    def familiarity(self, table: TrialTable) -> Floats:
+        """How like the things of each row are to those tried, (n,): 1 the same, 0 nothing of the kind."""
+        m = self.like_m.nearest(_shape(self.scale_m, table.shape_m))
+        o = self.like_o.nearest(_shape(self.scale_o, table.shape_o))
+        return m * o
+
+    def within(self, start: Floats) -> NDArray[np.bool_]:
+        """Whether places (n, 2) lie where things were tried, (n,); False where they are not known."""
+        scaled = (polar(start) - self.scale_s.centre) / self.scale_s.width
+        return np.asarray((np.abs(scaled) <= self.scale_s.limit).all(axis=1))
+
     def marginals(self, table: TrialTable) -> Floats:
         """p(bin) along x and y of each row, (n, 2, 5)."""
         features, _, _ = self._features(table)
@@ -190,5 +203,5 @@ def _maximise(
     first = np.zeros(size + int(some.sum()) * N_BINS)
     if guess is not None:
         first[:size] = (guess / own[:, None]).ravel() * 0.5
-    found = minimize(loss, first, jac=True, method="L-BFGS-B", options={"maxiter": 200, "ftol": 1e-7})
+    found = minimize(loss, first, jac=True, method="L-BFGS-B", options={"maxiter": 200, "ftol": 1e-6})
     return split(found.x)

@@ -16,7 +16,8 @@ from cognitive_arch.errors import ConfigError, unknown
 class Options:
     """What a reproduction may use: `out` is a folder for its files, `data` one with data sets.
 
-    `episodes` is None for as many as published; `jobs` processes may share the work.
+    `episodes` (or splits) is None for as many as published; `jobs` processes may share the work. `trials` is
+    a file of affordance trials, `protocol` how they are split (see `affordances.evaluation`).
     """
 
     out: Path
@@ -24,6 +25,8 @@ class Options:
     episodes: int | None = None
     seed: int = 0
     jobs: int = 1
+    trials: Path | None = None
+    protocol: str = "trial"
     on_progress: Callable[[int, int], None] = lambda done, total: None
     on_notice: Callable[[str], None] = lambda text: None
 
@@ -69,8 +72,17 @@ class Reproduction:
 
 
 _SWEEPS = "cognitive_arch.evaluation.published_sweeps"
+_AFFORDANCES = "cognitive_arch.evaluation.published_affordances"
 
 REPRODUCTIONS: Mapping[str, Reproduction] = {
+    "table6": Reproduction("complexity of the networks", "thesis Table 6", f"{_AFFORDANCES}:table6"),
+    "table8": Reproduction("networks on random splits", "thesis Table 8", f"{_AFFORDANCES}:table8"),
+    "table9": Reproduction("networks on unseen objects", "thesis Table 9", f"{_AFFORDANCES}:table9"),
+    "table10": Reproduction("simulation to reality", "thesis Table 10", f"{_AFFORDANCES}:table10"),
+    "table11": Reproduction("accuracy from hands to tools", "thesis Table 11", f"{_AFFORDANCES}:table11"),
+    "table12": Reproduction("tools chosen by who knows hands", "thesis Table 12", f"{_AFFORDANCES}:table12"),
+    "fig46": Reproduction("effects of pulling, on the table", "thesis Fig. 46", f"{_AFFORDANCES}:fig46"),
+    "fig47": Reproduction("motions by hands and by tools", "thesis Fig. 47", f"{_AFFORDANCES}:fig47"),
     "fig58": Reproduction("simple scene, both arms equally noisy", "thesis Fig. 58", f"{_SWEEPS}:fig58"),
     "fig59": Reproduction("simple scene, left arm's noise varied", "thesis Fig. 59", f"{_SWEEPS}:fig59"),
     "fig60": Reproduction("complex scene, both arms equally noisy", "thesis Fig. 60", f"{_SWEEPS}:fig60"),
@@ -120,6 +132,7 @@ def answer_text(answer: Mapping[str, Any]) -> str:
         lines.append(f"           published  {check['published']}")
         lines.append(f"           ours       {check['ours']}")
     agreeing = sum(check["holds"] for check in answer["checks"])
+    lines.extend(f"note     {note}" for note in answer.get("notes", ()))
     lines.append(f"{agreeing} of {len(answer['checks'])} agree; {answer['wall_s']:.1f} s")
     lines.extend(f"wrote {path}" for path in answer["files"] if not path.endswith(".svg"))
     return "\n".join(lines)

@@ -1,4 +1,4 @@
-"""`cogarch learn`: what the robot knows from examples, made again."""
+"""`cogarch learn`: what the robot knows from examples and from trials, made again."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ import typer
 from cognitive_arch.verbs.common import Json, SeedOption, print_answer
 
 app = typer.Typer(
-    help="Learn again from examples: what objects look like.",
+    help="Learn: what objects look like (objects), what can be done with them (networks).",
     rich_markup_mode=None,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
@@ -19,7 +19,7 @@ app = typer.Typer(
 
 @app.callback()
 def learn() -> None:
-    """Learn again from examples."""
+    """Learn from examples and from trials."""
 
 
 @app.command()
@@ -45,3 +45,63 @@ def objects(
         f"unknown things called unknown: {made['unknown_right']:.1%}\nwrote {made['file']}"
     )
     print_answer(made, text, as_json)
+
+
+@app.command()
+def networks(
+    trials: Annotated[
+        str,
+        typer.Argument(
+            metavar="TRIALS",
+            help="A file of trials (.csv, .parquet, .npz), or, with --data, a published table: hand, tool, "
+            "icub_tools, tools_2016.",
+        ),
+    ],
+    model: Annotated[
+        str,
+        typer.Option(
+            help="default; full, pca, pca-two-blocks, k2, bde, bde-annealed, mcmc (the thesis' networks); "
+            "majority, forest, logistic (to compare with)."
+        ),
+    ] = "default",
+    out: Annotated[
+        Path | None, typer.Option(metavar="FILE.json", help="Keep what was learned, for cogarch query.")
+    ] = None,
+    graph: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw the network (.png, .svg, .dot) or write it (.bif)."),
+    ] = None,
+    evaluate: Annotated[
+        int, typer.Option(metavar="SPLITS", help="Measure it on so many splits, beside the baselines.")
+    ] = 0,
+    protocol: Annotated[
+        str,
+        typer.Option(
+            help="trial, views, leave-one-object-out, leave-one-manipulator-out, or published (leaky: views "
+            "of one trial on both sides)."
+        ),
+    ] = "trial",
+    data: Annotated[
+        Path | None, typer.Option(metavar="DIR", help="Folder with the published tables.")
+    ] = None,
+    seed: SeedOption = 0,
+    as_json: Json = False,
+) -> None:
+    """Learn from trials what actions with hands and tools do to objects."""
+    from cognitive_arch.affordances import answers, evaluation
+    from cognitive_arch.errors import ConfigError, unknown
+
+    if evaluate < 0:
+        raise ConfigError(f"{evaluate} splits; valid: 0 (do not measure) or more")
+    if protocol not in evaluation.PROTOCOLS:
+        raise ConfigError(unknown("protocol", protocol, evaluation.PROTOCOLS))
+    answer = answers.learn(
+        answers.load_table(trials, data),
+        model,
+        out,
+        graph,
+        answers.Study(protocol, evaluate),
+        seed,
+        lambda text: print(text, file=sys.stderr),
+    )
+    print_answer(answer, answers.learn_text(answer), as_json)

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 
 import typer
 
-from cognitive_arch.errors import ConfigError
+from cognitive_arch.errors import ConfigError, unknown
 from cognitive_arch.verbs.common import Json, SeedOption, Stopped, print_answer
 
 JobsOption = Annotated[int, typer.Option(help="How many processes share the work on this machine.")]
@@ -104,7 +104,15 @@ def reproduce(
     out: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder for its files [default: reproduced/NAME].")
     ] = None,
-    episodes: Annotated[int | None, typer.Option(help="Episodes a point, other than published.")] = None,
+    episodes: Annotated[
+        int | None, typer.Option(help="Episodes a point (or splits), other than published.")
+    ] = None,
+    trials: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="Affordance trials of your own (table8 to fig47).")
+    ] = None,
+    protocol: Annotated[
+        str, typer.Option(help="How affordance trials are split: trial, views, or published (leaky).")
+    ] = "trial",
     seed: SeedOption = 0,
     jobs: JobsOption = 1,
     as_json: Json = False,
@@ -116,10 +124,14 @@ def reproduce(
         return print_answer(reproduction.listing(), reproduction.listing_text(), as_json)
     if episodes is not None and episodes < 1:
         raise ConfigError(f"{episodes} episodes; valid: 1 or more")
+    if protocol not in ("trial", "views", "published"):
+        raise ConfigError(unknown("protocol", protocol, ("trial", "views", "published")))
     folder = out or Path("reproduced") / name
 
     def work(on_rows: Callable[[int, int], None], on_notice: Callable[[str], None]) -> dict[str, Any]:
-        options = reproduction.Options(folder, data, episodes, seed, jobs, on_rows, on_notice)
+        options = reproduction.Options(
+            folder, data, episodes, seed, jobs, trials, protocol, on_rows, on_notice
+        )
         return reproduction.reproduce(name, options)
 
     answer = _carry_out(work, f"what is finished is kept, go on with: {command()}")
