@@ -27,7 +27,7 @@ def run_job(config: SweepConfig, job: Job, remember: bool = True) -> list[Row]:
 def _episode(config: SweepConfig, cell: Cell, episode: int, environment: Environment, remember: bool) -> Row:
     started = time.perf_counter()
     setting, task = _task(cell.scene, config.sentence)
-    planner = _planner(cell.planner, config.planning_seed, remember)
+    planner = _planner(cell.planner, config.planning_seed(episode), remember)
     seed = config.episode_seed(episode)
     run = RunConfig(
         scene=cell.scene,
@@ -86,7 +86,7 @@ def _task(scene: str, sentence: str) -> tuple[Setting, Task]:
     return setting, setting.understand(sentence)
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def _planner(name: str, seed: int, remember: bool) -> FixedSeed:
-    """One planner for all episodes of a process, so that they share what it remembers."""
+    """One planner for all episodes of a process with this seed, so that they share what it remembers."""
     return FixedSeed(make_planner(name), seed, remember)

@@ -28,6 +28,9 @@ COINS: Mapping[str, str] = {
     "text": "all that an arm does is as noisy as that arm (Sec. 6.4.6.1)",
     "published": "put and drop never fail by noise, as in the published runs",
 }
+PLANNING_SEEDS = 5
+"""So many seeds of planning calls are shared out among the episodes of a cell."""
+
 MOST_EPISODES = 1_000_000
 EPISODES_AT_ONCE: Mapping[str, int] = {"symbolic": 10, "drake": 1}
 """How many episodes one job is made of."""
@@ -149,10 +152,12 @@ class SweepConfig:
             np.random.SeedSequence([self.seed, episode]).generate_state(1, np.uint64)[0] >> np.uint64(1)
         )
 
-    @property
-    def planning_seed(self) -> int:
-        """The seed of every planning call (see `planning.memory`)."""
-        return int(np.random.SeedSequence([self.seed]).generate_state(2)[1])
+    def planning_seed(self, episode: int) -> int:
+        """The seed of every planning call of an episode (see `planning.memory`).
+
+        One of a few, so that plans can be remembered and yet no result hangs on one lucky seed.
+        """
+        return int(np.random.SeedSequence([self.seed, episode % PLANNING_SEEDS, 1]).generate_state(1)[0])
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for the manifest; `from_json` reads it back."""
