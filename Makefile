@@ -43,6 +43,7 @@ bench: setup
 	$(PY) benchmarks/run.py
 	$(PY) -m benchmarks.planner
 	$(PY) -m benchmarks.perception
+	$(PY) -m benchmarks.sweep
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

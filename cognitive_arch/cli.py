@@ -101,7 +101,11 @@ def run(
         str, typer.Option(help="Noise level: one number, or left=0.5,right=0.25,pull=0,push=0.")
     ] = "0",
     heuristics: Annotated[
-        str, typer.Option(help="all, none, or a list of adaptability,creativity,goal_maintenance.")
+        str,
+        typer.Option(
+            help="none, all (the published three), or a list of adaptability,creativity,goal_maintenance; or "
+            "reliability, which takes the place of the first two."
+        ),
     ] = "all",
     planner: PlannerOption = "guided-prada",
     seed: SeedOption = 0,

@@ -259,7 +259,7 @@ class Session:
             self._environment.restore(saved["environment"])
             self._world = WorldModel.from_json(saved["world"])
             self._rng = restore_rng(saved["rng"])
-            state = CycleState.from_json(saved["cycle"], settings.decay)
+            state = CycleState.from_json(saved["cycle"], settings)
         self._events = ()
         return self._begin(progress, settings).resume(state, task.goals, task.alternatives)
 

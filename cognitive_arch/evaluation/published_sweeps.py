@@ -44,13 +44,14 @@ class Curves:
         return max(abs(x - y) for x, y in zip(self.curve(a, what), self.curve(b, what), strict=True))
 
 
-def _told(values: list[float]) -> str:
+def told(values: list[float]) -> str:
+    """Numbers with two digits."""
     return ", ".join(f"{value:.2f}" for value in values)
 
 
 def _without_noise(c: Curves, actions: int) -> Check:
     totals = [c.of(name, "total", 0.0) for name in PUBLISHED]
-    ours = f"{_told(totals)} actions"
+    ours = f"{told(totals)} actions"
     return Check("actions without noise", f"{actions}, always", ours, all(t == actions for t in totals))
 
 
@@ -61,13 +62,13 @@ def _none_is_slow(c: Curves, reliable_to: float) -> list[Check]:
         Check(
             "without heuristics, success stays",
             f"1 for noise <= {reliable_to:g}, less only beyond",
-            f"{_told(success)} at noise 0, 0.25, 0.5, 0.75, 0.95",
+            f"{told(success)} at noise 0, 0.25, 0.5, 0.75, 0.95",
             min(early) >= 0.97 and success[-1] <= min(early),
         ),
         Check(
             "without heuristics, speed falls with noise",
             "many actions, up to 50, are asked for",
-            _told(speed),
+            told(speed),
             all(a >= b - 0.02 for a, b in itertools.pairwise(speed)) and speed[-1] <= speed[0] - 0.4,
         ),
     ]
@@ -85,7 +86,7 @@ def _adaptability_is_quick(c: Curves, name: str, least: float) -> Check:
     return Check(
         f"with {name}, speed stays high",
         "about constant",
-        _told(speed),
+        told(speed),
         min(speed) >= max(least, speed[0] - 0.2),
     )
 
@@ -93,7 +94,7 @@ def _adaptability_is_quick(c: Curves, name: str, least: float) -> Check:
 def _success_collapses(c: Curves, name: str, published: str) -> Check:
     success = c.curve(name, "success")
     falling = all(a >= b - 0.05 for a, b in itertools.pairwise(success))
-    return Check(f"with {name}, success collapses", published, _told(success), falling and success[-1] <= 0.1)
+    return Check(f"with {name}, success collapses", published, told(success), falling and success[-1] <= 0.1)
 
 
 def _fig58(c: Curves) -> list[Check]:
@@ -119,7 +120,7 @@ def _fig59(c: Curves) -> list[Check]:
         Check(
             f"with {BOTH}, neither falls much",
             "always in the top right region",
-            f"speed {_told(speed)}; success {_told(success)}",
+            f"speed {told(speed)}; success {told(success)}",
             min(speed) >= 0.75 and min(success) >= 0.75,
         ),
         Check(
@@ -150,7 +151,7 @@ def _fig60(c: Curves) -> list[Check]:
         Check(
             "with adaptability, success beyond",
             "drops to zero",
-            f"{_told(worst[ADAPTABILITY])} alone, {_told(worst[BOTH])} with creativity at noise 0.75, 0.95",
+            f"{told(worst[ADAPTABILITY])} alone, {told(worst[BOTH])} with creativity at noise 0.75, 0.95",
             all(three_quarters <= 0.2 and at_worst <= 0.02 for three_quarters, at_worst in worst.values()),
         ),
         Check(
@@ -189,7 +190,7 @@ def _fig61(c: Curves) -> list[Check]:
         Check(
             f"{BOTH} succeeds more often than adaptability for noise > 0.5",
             "outperforms in success",
-            f"{_told(others[BOTH])} against {_told(others[ADAPTABILITY])}",
+            f"{told(others[BOTH])} against {told(others[ADAPTABILITY])}",
             all(a > b + 0.3 for a, b in zip(others[BOTH], others[ADAPTABILITY], strict=True)),
         ),
         Check(

@@ -87,6 +87,11 @@ REPRODUCTIONS: Mapping[str, Reproduction] = {
     "fig59": Reproduction("simple scene, left arm's noise varied", "thesis Fig. 59", f"{_SWEEPS}:fig59"),
     "fig60": Reproduction("complex scene, both arms equally noisy", "thesis Fig. 60", f"{_SWEEPS}:fig60"),
     "fig61": Reproduction("complex scene, left arm's noise varied", "thesis Fig. 61", f"{_SWEEPS}:fig61"),
+    "reliability": Reproduction(
+        "the heuristic set of our own against the published four",
+        "Figs. 58 to 61",
+        "cognitive_arch.evaluation.reliability_study:reliability",
+    ),
 }
 """All that `cogarch reproduce` knows, by name."""
 

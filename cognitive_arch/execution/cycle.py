@@ -18,6 +18,8 @@ from cognitive_arch.execution.heuristics import (
     action_worked,
     undone,
 )
+from cognitive_arch.execution.reliability import Reliability, ReliabilitySettings
+from cognitive_arch.execution.weighing import Weighing, priors
 from cognitive_arch.outside import Happening, OutsideEvent, Schedule, told
 from cognitive_arch.planning.base import Planner, PlanResult
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
@@ -40,6 +42,7 @@ class CycleSettings:
     decay: float = 0.2
     max_actions: int = 50
     confirm_seconds: float = 1.0
+    reliability: ReliabilitySettings = ReliabilitySettings()
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,6 +95,7 @@ class CycleState:
     horizon: int
     adaptation: Adaptation
     outside: Schedule
+    reliability: Reliability = field(default_factory=Reliability)
     way: int = 0
     index: int = 0
     reached: set[int] = field(default_factory=set)
@@ -106,6 +110,7 @@ class CycleState:
             "horizon": self.horizon,
             "failures": [[str(action), n] for action, n in sorted(self.adaptation.failures.items())],
             "outside": [str(event) for event in self.outside.pending],
+            "reliability": self.reliability.to_json(),
             "way": self.way,
             "index": self.index,
             "reached": sorted(self.reached),
@@ -116,13 +121,14 @@ class CycleState:
         }
 
     @classmethod
-    def from_json(cls, data: Mapping[str, Any], decay: float) -> CycleState:
-        """The inverse of `to_json`; `decay` is the cycle's."""
+    def from_json(cls, data: Mapping[str, Any], settings: CycleSettings) -> CycleState:
+        """The inverse of `to_json`; `settings` are the cycle's."""
         failures = {parse_action(action): int(n) for action, n in data["failures"]}
         return cls(
             horizon=int(data["horizon"]),
-            adaptation=Adaptation(decay, failures),
+            adaptation=Adaptation(settings.decay, failures),
             outside=Schedule(map(OutsideEvent.parse, data["outside"])),
+            reliability=Reliability.from_json(data["reliability"], settings.reliability),
             way=int(data["way"]),
             index=int(data["index"]),
             reached=set(map(int, data["reached"])),
@@ -170,7 +176,10 @@ class PlanningCycle:
         `alternatives` are other lists that mean the same, tried (with creativity) when `goals` fail.
         """
         self.state = CycleState(
-            self._settings.horizon, Adaptation(self._settings.decay), Schedule(self._outside)
+            self._settings.horizon,
+            Adaptation(self._settings.decay),
+            Schedule(self._outside),
+            Reliability(self._settings.reliability),
         )
         self._world.update(observation)
         return self._work(goals, alternatives)
@@ -209,8 +218,7 @@ class PlanningCycle:
         state.total, state.good = state.total + 1, state.good + worked
         step = self._step(state.total, so_far, before, plan, result, worked, after)
         state.tried.append((action, worked))
-        if not worked and self._heuristics.adaptability:
-            state.events.append(state.adaptation.record(action, self._ground(before)))
+        self._learn(action, worked, step.reason, self._ground(before))
         self._on_step(step)  # last, so that whoever listens finds all that the next step begins with
 
     def _finish(self, plan: PlanResult | None, end: EndReason) -> EpisodeResult:
@@ -287,6 +295,8 @@ class PlanningCycle:
                 continue
             if state.total >= self._settings.max_actions:
                 return None, EndReason.ACTION_LIMIT
+            if self._heuristics.reliability:
+                return self._weigh(world)
             rules = state.adaptation.apply(self._ground(world))
             plan = self._planner.plan(world.atoms(), self._goal, rules, state.horizon, self._rng)
             if plan.action is not None:
@@ -296,8 +306,25 @@ class PlanningCycle:
                 why = f"no plan within {state.horizon - 1} actions: looking {state.horizon} ahead"
                 self._tell(EventKind.HORIZON_EXTENDED, why)
             elif not self._another_way():
-                gone = absent_entities(self._goal, [e.name for e in world.entities])
-                return plan, EndReason.MISSING_OBJECT if gone else EndReason.NO_PLAN
+                return plan, self._missing(world)
+
+    def _weigh(self, world: WorldState) -> tuple[PlanResult | None, EndReason | None]:
+        """Reliability: the plan, and the sub-goal it goes for, by expected cost instead of by horizon."""
+        state = self.state
+        weighing = Weighing(world.atoms(), self._ways, self._ground(world), state.reliability)
+        choice = weighing.choose(state.way, state.index, max(state.reached, default=0))
+        state.events.extend(choice.events)
+        if choice.way != state.way:
+            state.way = choice.way
+            state.reached.clear()
+        self._move_to(choice.index)
+        state.horizon = max(self._settings.horizon, len(choice.plan.actions) if choice.plan else 0)
+        return choice.plan, self._missing(world) if choice.end is EndReason.NO_PLAN else choice.end
+
+    def _missing(self, world: WorldState) -> EndReason:
+        """Why there is no plan: perhaps for lack of an object."""
+        gone = absent_entities(self._goal, [entity.name for entity in world.entities])
+        return EndReason.MISSING_OBJECT if gone else EndReason.NO_PLAN
 
     def _maintain_goals(self, atoms: State) -> None:
         """Step back while something that was reached, and is still asked for, has been undone.
@@ -348,6 +375,17 @@ class PlanningCycle:
         if state.entities not in self._grounded:
             self._grounded = {state.entities: self._rules.ground(state.entities, self._environment.skills)}
         return self._grounded[state.entities]
+
+    def _learn(
+        self, action: GroundAction, worked: bool, reason: FailureReason, rules: Sequence[GroundRule]
+    ) -> None:
+        event: Event | None = None
+        if self._heuristics.reliability:
+            event = self.state.reliability.record(action, worked, reason, priors(rules)[action])
+        elif not worked and self._heuristics.adaptability:
+            event = self.state.adaptation.record(action, rules)
+        if event is not None:
+            self.state.events.append(event)
 
     def _judge(self, action: GroundAction, before: WorldState, after: WorldState) -> bool:
         rule = covering_rule(self._ground(before), action, before.atoms())

@@ -20,6 +20,7 @@ class EndReason(StrEnum):
     NO_PLAN = "no_plan"  # the planner sees no way from here
     MISSING_OBJECT = "missing_object"  # the goal speaks of something that is not there
     ACTION_LIMIT = "action_limit"  # too many actions were attempted
+    HELP_ASKED = "help_asked"  # to go on is expected to cost more than help
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,7 @@
-"""The three heuristics of thesis Sec. 6.4.5.4, each switchable, and what the log says when one fires."""
+"""The three heuristics of thesis Sec. 6.4.5.4, each switchable, and what the log says when one fires.
+
+`reliability` is one of our own, in place of adaptability and creativity (see `reliability.py`).
+"""
 
 from __future__ import annotations
 
@@ -10,6 +13,8 @@ from cognitive_arch.errors import ConfigError, unknown
 from cognitive_arch.relational.rules import GroundRule, GroundRules, derived_of
 from cognitive_arch.relational.symbols import Goal, GroundAction, Literal, State
 
+PUBLISHED = ("adaptability", "creativity", "goal_maintenance")
+
 
 @dataclass(frozen=True, slots=True)
 class Heuristics:
@@ -18,17 +23,27 @@ class Heuristics:
     adaptability: bool = True
     creativity: bool = True
     goal_maintenance: bool = True
+    reliability: bool = False
+
+    def __post_init__(self) -> None:
+        if self.reliability and (self.adaptability or self.creativity):
+            raise ConfigError(
+                "reliability takes the place of adaptability and creativity; valid with it: goal_maintenance"
+            )
 
     def __str__(self) -> str:
         return ",".join(name for name, on in asdict(self).items() if on) or "none"
 
     @classmethod
     def parse(cls, text: str) -> Heuristics:
-        """Read `all`, `none`, or a list such as `adaptability,creativity` (`+` separates, too)."""
+        """Read `all` (the published three), `none`, or a list such as `adaptability,creativity`.
+
+        `+` separates, too.
+        """
         names = [f.name for f in fields(cls)]
         word = text.strip().lower()
         if word in ("all", "none"):
-            return cls(**dict.fromkeys(names, word == "all"))
+            return cls(**dict.fromkeys(PUBLISHED, word == "all"))
         chosen = [part.strip().replace("-", "_") for part in word.replace("+", ",").split(",")]
         for part in chosen:
             if part not in names:
@@ -47,6 +62,7 @@ class EventKind(StrEnum):
     OTHER_HAND = "other_hand"
     GOAL_LOST = "goal_lost"
     OUTSIDE = "outside"
+    RELIABILITY = "reliability"
 
 
 @dataclass(frozen=True, slots=True)

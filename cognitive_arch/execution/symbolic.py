@@ -115,7 +115,7 @@ class SymbolicEnvironment:
         if rule is None:
             return SkillResult(Outcome.FAILURE, FailureReason.NO_EFFECT)
         level = self.noise.of(action, self.domain.capabilities)
-        if self._rng.random() < (0.0 if self.quiet_release and _releases(rule) else level):
+        if self._rng.random() < (0.0 if self.quiet_release and releases(rule) else level):
             return SkillResult(Outcome.FAILURE, FailureReason.NOISE)
         before = self._xy(action.args[0])
         self._apply(rule)
@@ -342,7 +342,8 @@ class SymbolicEnvironment:
         return x0, y0
 
 
-def _releases(rule: GroundRule) -> bool:
+def releases(rule: GroundRule) -> bool:
+    """Whether the action is for emptying a hand."""
     return any(lit.atom.predicate == "inHand" and not lit.positive for lit in rule.outcomes[0].literals)
 
 
