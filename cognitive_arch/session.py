@@ -26,7 +26,7 @@ from cognitive_arch.language.instruction import parse_instruction
 from cognitive_arch.language.semantic_memory import SemanticInstruction, SemanticMemory
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.planning.base import Planner
-from cognitive_arch.planning.compilation import warm_up
+from cognitive_arch.planning.compilation import warm_up, warm_up_search
 from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
@@ -374,10 +374,18 @@ def _prepared(task: Task, config: RunConfig, setting: Setting) -> Iterator[Envir
         environment.close()
 
 
+def prepare(planner: str, heuristics: Heuristics, on_notice: Callable[[str], None]) -> None:
+    """Compile, or load, what an episode with these will need."""
+    if heuristics.reliability:
+        warm_up_search(on_notice)
+    else:
+        warm_up(make_planner(planner), on_notice)
+
+
 def _compile(config: RunConfig, progress: Progress) -> float:
     """Seconds that went into compiling: once on a machine, and no part of the run."""
     began = time.perf_counter()
-    warm_up(make_planner(config.planner), progress.on_notice)
+    prepare(config.planner, config.heuristics, progress.on_notice)
     return time.perf_counter() - began
 
 

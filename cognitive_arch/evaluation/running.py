@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import logging
 import os
 import signal
@@ -10,7 +11,6 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
-from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +18,9 @@ from cognitive_arch.errors import SweepError, one_line
 from cognitive_arch.evaluation.episodes import run_job
 from cognitive_arch.evaluation.rows import Row, open_rows
 from cognitive_arch.evaluation.sweep import Job, SweepConfig
-from cognitive_arch.planning.compilation import warm_up
-from cognitive_arch.planning.registry import make_planner
+from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.runlog.records import versions
+from cognitive_arch.session import prepare
 
 PATIENCE_S = 5
 """How long a scheduler may take to answer."""
@@ -65,15 +65,24 @@ def run_sweep(
         before, total = rows.done, config.total
         on_rows(before, total)
         if before < total:
-            for planner in config.planners:
-                warm_up(make_planner(planner), on_notice)
+            for planner, heuristics in itertools.product(config.planners, config.heuristics):
+                prepare(planner, Heuristics.parse(heuristics), on_notice)
         try:
             for done in _in_order(config.jobs(before), work, jobs, client):
                 rows.append(done)
                 on_rows(rows.done, total)
-        except KeyboardInterrupt:
+        except (KeyboardInterrupt, SystemError) as error:
+            if not _is_ctrl_c(error):
+                raise
             raise SweepInterrupted(rows.done, total) from None
         return rows.done - before
+
+
+def _is_ctrl_c(error: BaseException | None) -> bool:
+    """Ctrl-C in the midst of a compiled call comes out as the cause of a `SystemError`."""
+    while error is not None and not isinstance(error, KeyboardInterrupt):
+        error = error.__cause__ or error.__context__
+    return error is not None
 
 
 def _in_order(jobs: Iterable[Job], work: Work, n: int, client: Any) -> Iterator[list[Row]]:
@@ -116,12 +125,12 @@ def _on_cluster(jobs: Iterable[Job], work: Work, client: Any) -> Iterator[list[R
     """Keep the workers busy a few jobs ahead; what a lost worker had is done again by another."""
     remaining = iter(jobs)
     n = max(len(client.scheduler_info(n_workers=-1)["workers"]), 1) * AHEAD
-    waiting = deque(client.submit(work, job, pure=False) for job in islice(remaining, n))
+    waiting = deque(client.submit(work, job, pure=False) for job in itertools.islice(remaining, n))
     try:
         while waiting:
             done = waiting.popleft()
             rows = _result(done)
-            waiting.extend(client.submit(work, job, pure=False) for job in islice(remaining, 1))
+            waiting.extend(client.submit(work, job, pure=False) for job in itertools.islice(remaining, 1))
             yield rows
     finally:
         client.cancel(list(waiting))

@@ -11,8 +11,9 @@ from types import FrameType
 import numpy as np
 
 from cognitive_arch.planning.base import ArrayPlanner, Planner
+from cognitive_arch.planning.cheapest import cheapest_way
 from cognitive_arch.relational.rules import GroundOutcome, GroundRule
-from cognitive_arch.relational.symbols import Atom, GroundAction, Literal
+from cognitive_arch.relational.symbols import Atom, Goal, GroundAction, Literal, State
 
 PATIENCE_S = 1.5
 """Loading what is compiled takes less than this."""
@@ -23,19 +24,35 @@ def warm_up(planner: Planner, notify: Callable[[str], None] = lambda text: None)
 
     If that takes long, `notify` is told why, from another thread. What is compiled is kept on disk.
     """
-    if not isinstance(planner, ArrayPlanner):
-        return
+    if isinstance(planner, ArrayPlanner):
+        _prepare(
+            lambda state, goal, rules: planner.plan(state, goal, rules, 2, np.random.default_rng(0)),
+            f"the planner {planner.name}",
+            notify,
+        )
+
+
+def warm_up_search(notify: Callable[[str], None] = lambda text: None) -> None:
+    """The same for the search of the cheapest way."""
+    _prepare(lambda state, goal, rules: cheapest_way(state, goal, rules, lambda a: 0.5), "the search", notify)
+
+
+def _prepare(
+    solve: Callable[[State, Goal, tuple[GroundRule, ...]], object],
+    what: str,
+    notify: Callable[[str], None],
+) -> None:
     done = Atom("done", ())
     rule = GroundRule(
         GroundAction("do", ()), (Literal(done, False),), (GroundOutcome(0.5, (Literal(done),)),)
     )
-    notice = f"compiling the planner {planner.name}, once on this machine; this takes up to a minute ..."
+    notice = f"compiling {what}, once on this machine; this takes up to a minute ..."
     timer = threading.Timer(PATIENCE_S, notify, (notice,))
     timer.daemon = True
     timer.start()
     try:
         with _deaf_to_ctrl_c(notify):
-            planner.plan(frozenset(), (Literal(done),), (rule,), 2, np.random.default_rng(0))
+            solve(frozenset(), (Literal(done),), (rule,))
     finally:
         timer.cancel()
 

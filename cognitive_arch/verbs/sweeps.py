@@ -90,7 +90,7 @@ def sweep(
         done = run_sweep(config, out, command(), on_rows=on_rows, on_notice=on_notice, **settings)  # type: ignore[arg-type]
         return report.sweep_answer(out, config, done, write_results(out, beside))
 
-    answer = _carry_out(work, f"finished rows are kept, go on with: {command()}")
+    answer = _carry_out(work, f"go on with: {command()}")
     print_answer(answer, report.sweep_text(answer), as_json)
 
 

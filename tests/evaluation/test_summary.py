@@ -87,7 +87,9 @@ def test_cost_against_the_price_of_help() -> None:
 
 def test_what_somebody_who_knew_the_noise_would_pay() -> None:
     assert omniscient_cost("simple", NoiseLevels(0.5, 0.5, 0.5, 0.5), quiet_release=True) == pytest.approx(6)
-    assert omniscient_cost("simple", NoiseLevels(0.95, 0.25), quiet_release=True) == pytest.approx(2 + 2 / 0.75)
+    assert omniscient_cost("simple", NoiseLevels(0.95, 0.25), quiet_release=True) == pytest.approx(
+        2 + 2 / 0.75
+    )
     assert omniscient_cost("simple", NoiseLevels(1, 1, 1, 1), quiet_release=True) == 20
     assert omniscient_cost("complex", NoiseLevels(), quiet_release=False) == pytest.approx(7)
 
@@ -110,7 +112,13 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_the_results_of_a_sweep(finished: Path) -> None:
     results = write_results(finished)
     names = {str(path.relative_to(finished)) for path in results.files}
-    assert {"rows.parquet", "summary.csv", "comparisons.csv", "index.html", "figures/simple-both.svg"} <= names
+    assert {
+        "rows.parquet",
+        "summary.csv",
+        "comparisons.csv",
+        "index.html",
+        "figures/simple-both.svg",
+    } <= names
     pd.testing.assert_frame_equal(pd.read_parquet(finished / "rows.parquet"), read_rows(finished))
     assert len(pd.read_csv(finished / "summary.csv")) == 5 * 2
     assert len(pd.read_csv(finished / "comparisons.csv")) == 10 * 2

@@ -196,7 +196,7 @@ BAD = [
     (["--vary", "nose"], "unknown capability to vary 'nose'"),
     (["--vary", "left+left"], "names one twice"),
     (["--scene", "moon"], "unknown scene 'moon'"),
-    (["--scene", "toys"], "toys"),
+    (["--scene", "toys"], "I do not know the word 'ham'; this scene has Big-box"),
     (["--backend", "real"], "unknown backend 'real'"),
     (["--planner", "luck"], "unknown planner 'luck'"),
     (["--coin", "fair"], "unknown coin 'fair'; valid: published, text"),
