@@ -15,7 +15,7 @@ from rich.console import Console
 from rich.markup import escape
 
 from cognitive_arch.demos import Demo
-from cognitive_arch.execution.cycle import Step
+from cognitive_arch.execution.episode import Step
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.records import step_record
 from cognitive_arch.session import Progress, RunConfig, Task

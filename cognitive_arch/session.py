@@ -15,8 +15,9 @@ import numpy as np
 from cognitive_arch.domain import Domain, Scene, load_domain
 from cognitive_arch.errors import BackendError, ConfigError, RuleError, StoreError, one_line, unknown
 from cognitive_arch.execution.backends import BACKENDS, make_environment, reach_model
-from cognitive_arch.execution.cycle import CycleSettings, CycleState, EpisodeResult, PlanningCycle, Step
+from cognitive_arch.execution.cycle import PlanningCycle
 from cognitive_arch.execution.environment import Environment
+from cognitive_arch.execution.episode import CycleSettings, CycleState, EpisodeResult, Step
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.metrics import speed
 from cognitive_arch.execution.noise import NoiseLevels

@@ -15,7 +15,7 @@ import pytest
 
 from cognitive_arch import session
 from cognitive_arch.errors import CogArchError, ConfigError, StateError, StoreError
-from cognitive_arch.execution.cycle import Step
+from cognitive_arch.execution.episode import Step
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.outside import OutsideEvent

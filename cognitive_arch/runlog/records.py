@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cognitive_arch import __version__
-from cognitive_arch.execution.cycle import EpisodeResult, Step
+from cognitive_arch.execution.episode import EpisodeResult, Step
 from cognitive_arch.world.state import sorted_atoms
 
 LIBRARIES = ("drake", "icub_models", "numpy", "numba", "lark")

@@ -22,7 +22,7 @@ from types import TracebackType
 from typing import Any, TextIO
 
 from cognitive_arch.errors import StoreError, one_line, unknown
-from cognitive_arch.execution.cycle import Step
+from cognitive_arch.execution.episode import Step
 from cognitive_arch.runlog.records import step_record
 from cognitive_arch.world.state import WorldState
 from cognitive_arch.world.store import WorldStateStore

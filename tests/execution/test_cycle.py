@@ -8,8 +8,9 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import pytest
 
-from cognitive_arch.execution.cycle import CycleSettings, EpisodeResult, PlanningCycle, Step
+from cognitive_arch.execution.cycle import PlanningCycle
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
+from cognitive_arch.execution.episode import CycleSettings, EpisodeResult, Step
 from cognitive_arch.execution.explain import Attempts, EndReason
 from cognitive_arch.execution.heuristics import EventKind, Heuristics
 from cognitive_arch.execution.noise import NoiseLevels

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cognitive_arch.errors import ConfigError
-from cognitive_arch.execution.cycle import CycleSettings, CycleState
 from cognitive_arch.execution.environment import FailureReason
+from cognitive_arch.execution.episode import CycleSettings, CycleState
 from cognitive_arch.execution.explain import EndReason
 from cognitive_arch.execution.heuristics import EventKind, Heuristics
 from cognitive_arch.execution.reliability import Capability, Reliability, ReliabilitySettings, capability_of
