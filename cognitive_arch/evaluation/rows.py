@@ -123,6 +123,8 @@ def open_rows(folder: Path, config: SweepConfig, command: str) -> Iterator[RowFi
                 f"another process is writing to {path}; wait for it or take another --out"
             ) from None
         rows = RowFile(file, path, _mend(file, path, config))
+        if rows.done < config.total:
+            _check_versions(folder)
         yield rows
 
 
@@ -175,7 +177,11 @@ def _compare(folder: Path, mine: Mapping[str, Any], theirs: Mapping[str, Any]) -
         )
     if mine["setting"] != theirs["setting"]:
         raise SweepError(f"scene, domain or rules have changed since {folder} was begun; take another --out")
-    then, now = theirs["versions"], mine["versions"]
+
+
+def _check_versions(folder: Path) -> None:
+    """What is missing must be added by what made the rest; a finished sweep may be drawn anew by any."""
+    then, now = read_manifest(folder)["versions"], versions()
     changed = sorted(key for key in {*then, *now} if then.get(key) != now.get(key))
     if changed:
         told = ", ".join(f"{key} {then.get(key)}, now {now.get(key)}" for key in changed)

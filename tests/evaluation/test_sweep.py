@@ -254,6 +254,18 @@ def test_rows_that_somebody_changed_are_refused(undisturbed: Path, tmp_path: Pat
         run_sweep(TINY, tmp_path)
 
 
+def test_other_versions_may_draw_but_not_go_on(undisturbed: Path, tmp_path: Path) -> None:
+    manifest = (undisturbed / "sweep.json").read_text()
+    (tmp_path / "sweep.json").write_text(manifest.replace('"numpy": "', '"numpy": "0.'))
+    (tmp_path / "rows.csv").write_bytes((undisturbed / "rows.csv").read_bytes())
+    assert run_sweep(TINY, tmp_path) == 0
+    lines = (tmp_path / "rows.csv").read_text().splitlines(keepends=True)
+    (tmp_path / "rows.csv").write_text("".join(lines[:20]))
+    with pytest.raises(SweepError, match=r"begun with other versions \(numpy 0\."):
+        run_sweep(TINY, tmp_path)
+    assert (tmp_path / "rows.csv").read_text() == "".join(lines[:20])
+
+
 def test_two_sweeps_do_not_write_into_one_folder(tmp_path: Path) -> None:
     def on_rows(done: int, total: int) -> None:
         if done == 0:
@@ -282,3 +294,15 @@ def test_a_full_disk_keeps_whole_rows(tmp_path: Path, undisturbed: Path, small_d
     resource.setrlimit(resource.RLIMIT_FSIZE, (hard, hard))
     run_sweep(TINY, tmp_path / "out")
     assert rows_of(tmp_path / "out") == rows_of(undisturbed)
+
+
+@pytest.mark.physics
+def test_physics_is_swept_in_the_same_way(tmp_path: Path) -> None:
+    config = SweepConfig(
+        backends=("symbolic", "drake"), heuristics=("reliability",), noise=(0.0,), episodes=1, seed=2
+    )
+    run_sweep(config, tmp_path / "out", jobs=2)
+    header, *rows = rows_of(tmp_path / "out")
+    found = [dict(zip(header, row, strict=True)) for row in rows]
+    assert [row["backend"] for row in found] == ["symbolic", "drake"]
+    assert [(row["success"], row["good"], row["total"]) for row in found] == [("true", "4", "4")] * 2
