@@ -16,15 +16,17 @@ from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
 from sim.clearance import Clearance
+from sim.eyes import Eyes
 from sim.hands import Posture
 from sim.kinematics import Kinematics
 from sim.meddling import disturb
 from sim.noise import EpisodeNoise, PhysicalNoise
-from sim.perception import OraclePerception
+from sim.perception import OraclePerception, Perception
 from sim.pictures import LARGE, SMALL, Stage, View, save_picture, write_recording, write_video
 from sim.recorder import Recorder
 from sim.robot import Robot
 from sim.scenario import FRICTION
+from sim.sight import CameraPerception
 from sim.skills import SKILLS
 from sim.skills.base import let_go_of_lost, unusable_arguments
 from sim.world import World
@@ -55,6 +57,7 @@ class DrakeEnvironment:
         video: bool = False,
         friction: float = FRICTION,
         reach: str = "kinematic",
+        perception: str = "camera",
     ) -> None:
         self._domain = domain
         self._scene = scene
@@ -68,6 +71,10 @@ class DrakeEnvironment:
         self.recorder = Recorder(self.world, keep=record)
         self._stage = Stage(domain, scene) if record else None
         self._video = video
+        self._eyes, self._classify = None, None
+        if perception == "camera":
+            self._eyes = Eyes(domain, scene)
+            self._classify = load_recogniser(domain.name).classify
         self._robot: Robot | None = None
         self._folder: Path | None = None
 
@@ -91,6 +98,11 @@ class DrakeEnvironment:
     def _new_robot(self, rng: np.random.Generator) -> Robot:
         noise = EpisodeNoise(self._noise, self.world, rng)
         truth = OraclePerception(self.world, self._kinematics, self._reach)
+        perception: Perception = truth
+        if self._eyes is not None and self._classify is not None:
+            perception = CameraPerception(
+                self.world, self._kinematics, self._reach, self._eyes, self._classify
+            )
         return Robot(
             self._domain,
             self._scene,
@@ -99,7 +111,7 @@ class DrakeEnvironment:
             rng,
             self._kinematics,
             self._clearance,
-            perception=truth,
+            perception=perception,
             truth=truth,
         )
 

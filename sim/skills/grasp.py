@@ -71,6 +71,7 @@ def pick_up(
     world.follow(plan.down, 1.0)
     world.move_fingers(hand, grip.closed, 0.5)
     world.hold(0.15)
+    robot.perception.take_hold(hand, name)
     world.follow([world.with_fingers(q, hand, grip.closed) for q in plan.back], 1.0)
     world.hold(0.1)
     if robot.perception.held(hand) != name:
