@@ -46,6 +46,12 @@ RecordOption = Annotated[
     bool, typer.Option("--record/--no-record", help="Keep a Meshcat recording and pictures (drake).")
 ]
 VideoOption = Annotated[bool, typer.Option("--video", help="Make a video of the run, too (drake).")]
+PerceptionOption = Annotated[
+    str | None,
+    typer.Option(
+        help="How the robot knows its table: camera (drake's own way) or oracle (the simulation tells)."
+    ),
+]
 EventOption = Annotated[
     list[str],
     typer.Option(
@@ -118,6 +124,7 @@ def run(
             help="How the robot knows what it reaches: kinematic (drake's own way) or published (constants)."
         ),
     ] = None,
+    perception: PerceptionOption = None,
     rules: RulesOption = None,
     event: EventOption = [],  # noqa: B006 (typer wants a list)
     store: StoreOption = Path("runs"),
@@ -147,6 +154,7 @@ def run(
         seed=seed,
         jitter=jitter,
         reach=reach,
+        perception=perception,
         rules=rules,
         record=record,
         video=video,
@@ -188,6 +196,7 @@ def demo(
         str | None, typer.Option(help="drake or symbolic, in place of the demo's own.")
     ] = None,
     seed: SeedOption = 0,
+    perception: PerceptionOption = None,
     store: StoreOption = Path("runs"),
     record: RecordOption = True,
     video: VideoOption = False,
@@ -202,7 +211,7 @@ def demo(
     if name is None:
         return print_answer(demos.to_json(), str(demos), as_json)
     chosen = demos.find(name)
-    config = chosen.config(backend, seed, record, video)
+    config = chosen.config(backend, seed, record, video, perception)
     print_answer({}, "" if as_json else report.demo_text(chosen, config), False)
 
     def work(progress: Progress) -> dict[str, Any]:

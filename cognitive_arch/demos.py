@@ -39,7 +39,12 @@ class Demo(BaseModel):
     succeeds: bool = True
 
     def config(
-        self, backend: str | None = None, seed: int = 0, record: bool = True, video: bool = False
+        self,
+        backend: str | None = None,
+        seed: int = 0,
+        record: bool = True,
+        video: bool = False,
+        perception: str | None = None,
     ) -> RunConfig:
         """How to run it; raises `ConfigError` for settings that cannot be."""
         return RunConfig(
@@ -51,6 +56,7 @@ class Demo(BaseModel):
             jitter=self.jitter,
             record=record,
             video=video,
+            perception=perception,
             events=self.events,
         )
 

@@ -50,6 +50,10 @@ def step_text(record: dict[str, Any]) -> str:
         )
         change = _brief("+", record["added"]) + _brief("-", record["removed"])
         lines.append("        " + (" ".join(change) or "nothing changed"))
+        wrong = record.get("misbelief") or {"wrong": [], "overlooked": []}
+        if wrong["wrong"] or wrong["overlooked"]:
+            told = _brief("+", wrong["wrong"]) + _brief("-", wrong["overlooked"])
+            lines.append("        mistaken: " + " ".join(told))
     return "\n".join(lines)
 
 

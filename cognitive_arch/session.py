@@ -14,7 +14,7 @@ import numpy as np
 
 from cognitive_arch.domain import Domain, Scene, load_domain
 from cognitive_arch.errors import BackendError, ConfigError, RuleError, StoreError, one_line, unknown
-from cognitive_arch.execution.backends import BACKENDS, make_environment, reach_model
+from cognitive_arch.execution.backends import BACKENDS, make_environment, perception_source, reach_model
 from cognitive_arch.execution.cycle import PlanningCycle
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.episode import CycleSettings, CycleState, EpisodeResult, Step
@@ -31,12 +31,13 @@ from cognitive_arch.planning.compilation import warm_up, warm_up_search
 from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
-from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction
+from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction, State, satisfied
 from cognitive_arch.runlog.records import action_record, result_record, versions
 from cognitive_arch.runlog.store import Checkpoint, Run, RunStore, RunWriter
 from cognitive_arch.scenes import load_scene, scene_paths
 from cognitive_arch.world.anchoring import WorldModel
-from cognitive_arch.world.observation import HANDS
+from cognitive_arch.world.observation import HANDS, Observation
+from cognitive_arch.world.state import StateChange
 
 FORMAT = 1  # of saved states
 CORE_PREDICATES = {
@@ -144,6 +145,7 @@ class RunConfig:
     record: bool = True
     events: tuple[OutsideEvent, ...] = ()
     reach: str | None = None
+    perception: str | None = None
     video: bool = False
 
     def __post_init__(self) -> None:
@@ -159,6 +161,7 @@ class RunConfig:
         if self.backend not in BACKENDS:
             raise ConfigError(unknown("backend", self.backend, BACKENDS))
         reach_model(self.backend, self.reach)
+        perception_source(self.backend, self.perception)
         if self.video and not (self.record and self.backend == "drake"):
             raise ConfigError("a video needs physics and a recording: --backend drake, without --no-record")
         make_planner(self.planner)
@@ -169,6 +172,7 @@ class RunConfig:
             "noise": str(self.noise),
             "heuristics": str(self.heuristics),
             "reach": reach_model(self.backend, self.reach),
+            "perception": perception_source(self.backend, self.perception),
         }
         return asdict(self) | texts | {"events": [str(event) for event in self.events]}
 
@@ -367,6 +371,7 @@ def _prepared(task: Task, config: RunConfig, setting: Setting) -> Iterator[Envir
         record=config.record,
         video=config.video,
         reach=config.reach,
+        perception=config.perception,
     )
     try:
         _check_skills(task, config.backend, environment)
@@ -425,7 +430,7 @@ class _Episode:
             if step.action is not None:
                 self.environment.keep_step(step.number)
                 state = session.save()
-            self.run.add_step(step, state, wall())
+            self.run.add_step(step, state, wall(), self._misbelief(step))
             progress.on_step(step)
 
         listening = Progress(on_act=progress.on_act, on_step=on_step)
@@ -436,6 +441,7 @@ class _Episode:
             result = session.resume(self.task, checkpoint.state, listening)
         artifacts = [str(self.run.folder / name) for name in self.environment.save_artifacts()]
         outcome = result_record(result, speed(result.total)) | {"wall_s": round(wall(), 3)}
+        outcome |= {"goal_holds": self._goal_holds(result)}
         self.run.finish(outcome | {"artifacts": artifacts})
         steps = self.store.steps(self.run.run_id)
         return {
@@ -447,15 +453,32 @@ class _Episode:
             "planner": self.config.planner,
             "heuristics": str(self.config.heuristics),
             "noise": str(self.config.noise),
-            "reach": self.config.to_json()["reach"],
+            "reach": reach_model(self.config.backend, self.config.reach),
+            "perception": perception_source(self.config.backend, self.config.perception),
             "physical_noise": list(self.environment.noise_told),
             "events": [str(event) for event in self.setting.scene.events],
             **outcome,
             "subgoals": self.task.to_json()["subgoals"],
             "actions": [action_record(record) for record in steps if record["action"]],
+            "misbeliefs": sum(len(atoms) for r in steps for atoms in (r["misbelief"] or {}).values()),
             "artifacts": artifacts,
             "store": str(self.store.folder),
         }
+
+    def _misbelief(self, step: Step) -> StateChange | None:
+        """What the robot takes for true after a step and is not, and what it overlooks."""
+        truth = self.environment.truth()
+        return None if truth is None else StateChange.between(_atoms(truth), step.after.atoms())
+
+    def _goal_holds(self, result: EpisodeResult) -> bool:
+        """Whether the goal, in one of the ways to it, really holds in the end."""
+        truth = self.environment.truth()
+        atoms = result.final.atoms() if truth is None else _atoms(truth)
+        return any(satisfied(ways[-1], atoms) for ways in (self.task.goals, *self.task.alternatives))
+
+
+def _atoms(observation: Observation) -> State:
+    return WorldModel().update(observation).atoms()
 
 
 def _check_skills(task: Task, backend: str, environment: Environment) -> None:

@@ -12,6 +12,7 @@ from cognitive_arch.errors import StoreError
 from cognitive_arch.execution.environment import FailureReason, Outcome, SkillResult
 from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
 from cognitive_arch.outside import OutsideEvent
+from cognitive_arch.perception.recognition import load_recogniser
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
@@ -119,6 +120,10 @@ class DrakeEnvironment:
         """See `Environment.observe`."""
         return self.robot.perception.observe()
 
+    def truth(self) -> Observation | None:
+        """See `Environment.truth`."""
+        return None if self.robot.perception is self.robot.truth else self.robot.truth.observe()
+
     def execute(self, action: GroundAction) -> SkillResult:
         """See `Environment.execute`."""
         entry = SKILLS.get(action.name)
@@ -196,8 +201,13 @@ class DrakeEnvironment:
         """See `Environment.keep_step`: two pictures of the step, and the trajectory so far."""
         if self._folder is None:
             return
-        for view in View:
-            self._take(self._folder / f"step-{number:02}-{view}.png", view)
+        self._take(self._folder / f"step-{number:02}-{View.SIDE}.png", View.SIDE)
+        eye = self._folder / f"step-{number:02}-{View.EYE}.png"
+        picture = self.robot.perception.picture()
+        if picture is None:
+            self._take(eye, View.EYE)
+        else:
+            save_picture(picture, eye)
         self.recorder.trajectory().save(self._folder / TRAJECTORY)
 
     def save_artifacts(self) -> tuple[str, ...]:

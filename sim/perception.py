@@ -19,6 +19,7 @@ from cognitive_arch.footprint import outer_radius
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 from sim.hands import HANDLE, SIDES, finger_names, hand_links
 from sim.kinematics import Kinematics
+from sim.rendering import Pixels
 from sim.world import World
 
 BEYOND = 0.05  # m by which a tool's head must get beyond the middle of an object
@@ -79,6 +80,10 @@ class Perception(ABC):
 
     def take_hold(self, hand: str, name: str) -> None:  # noqa: B027 (nothing to note where all is known)
         """Note that the fingers of `hand` close around an object at this moment."""
+
+    def picture(self) -> Pixels | None:
+        """The last look as an image, with what was made of it; None where there are no eyes."""
+        return None
 
     def save(self) -> dict[str, Any]:
         """What is remembered from one look to the next, as plain data."""

@@ -7,14 +7,14 @@ hand tells that it touches something, but not what.
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cognitive_arch.domain import Domain, ReachLimits
+from cognitive_arch.domain import ReachLimits
+from cognitive_arch.perception.overlay import draw
 from cognitive_arch.perception.pose import outline_distance
 from cognitive_arch.perception.scene import Classify, SceneView, Sighting, sightings
 from cognitive_arch.shapes import Shape
@@ -24,6 +24,7 @@ from sim.eyes import EyeImage, Eyes
 from sim.hands import SIDES, hand_links
 from sim.kinematics import Kinematics
 from sim.perception import Perception
+from sim.rendering import Pixels
 from sim.world import World
 
 PRESSED = 0.001  # m that a pad stays short of its command when something is in its way
@@ -108,6 +109,16 @@ class CameraPerception(Perception):
         # The skin does not tell one thing from another; robot and table it knows from its joints.
         things = set(self._shapes)
         return any(a in links and b in things for a, b in self._world.contacts())
+
+    def picture(self) -> Pixels | None:
+        """See `Perception.picture`: names of what is seen, and crosses for what is remembered."""
+        if self.image is None:
+            return None
+        tracks = self._tracker.tracks.items()
+        hidden = {name: track.pose[:3, 3] for name, track in tracks if not track.visible}
+        places = self.image.camera.project(np.array(list(hidden.values())).reshape(-1, 3))
+        remembered = {name: (float(x), float(y)) for name, (x, y) in zip(hidden, places, strict=True)}
+        return draw(self.image.color, self.sightings, self.image.own, remembered)
 
     # -- what is believed -----------------------------------------------------------------------------------
 

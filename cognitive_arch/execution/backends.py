@@ -18,19 +18,33 @@ REACH_MODELS: Mapping[str, tuple[str, ...]] = {  # what each backend can tell re
     "drake": ("kinematic", "published"),
     "symbolic": ("published",),
 }
+PERCEPTIONS: Mapping[str, tuple[str, ...]] = {  # how the robot knows what is where, each one's own way first
+    "drake": ("camera", "oracle"),
+    "symbolic": ("oracle",),
+}
 
 
 def reach_model(backend: str, asked: str | None = None) -> str:
     """How reach is told: `kinematic` by solving for the arms' joints, `published` by the constants of the
     scene (ch. 6 of the thesis). None is the backend's own way. Raises `ConfigError`."""
-    known = REACH_MODELS[backend]
+    return _choice("reach", REACH_MODELS, backend, asked)
+
+
+def perception_source(backend: str, asked: str | None = None) -> str:
+    """How the robot knows its surroundings: `camera` by its eyes, `oracle` by the simulation itself. None is
+    the backend's own way. Raises `ConfigError`."""
+    return _choice("perception", PERCEPTIONS, backend, asked)
+
+
+def _choice(what: str, choices: Mapping[str, tuple[str, ...]], backend: str, asked: str | None) -> str:
+    known = choices[backend]
     if asked is None:
         return known[0]
-    if asked not in {name for names in REACH_MODELS.values() for name in names}:
-        raise ConfigError(unknown("reach", asked, REACH_MODELS["drake"]))
+    if asked not in {name for names in choices.values() for name in names}:
+        raise ConfigError(unknown(what, asked, choices["drake"]))
     if asked not in known:
         raise ConfigError(
-            f"the {backend} backend has no {asked} reach, for it has no arms; valid: {', '.join(known)}"
+            f"the {backend} backend has no {asked} {what}, for it has no body; valid: {', '.join(known)}"
         )
     return asked
 
@@ -46,24 +60,32 @@ def make_environment(
     record: bool = False,
     video: bool = False,
     reach: str | None = None,
+    perception: str | None = None,
     quiet_release: bool = False,
 ) -> Environment:
     """An environment for one scene; raises `BackendError` for an unknown or unusable one.
 
     `rules` are the truth of the symbolic world; physics needs none. `record` keeps pictures and
-    what else `save_artifacts` finishes, with `video` a video, too. `reach` is one of the backend's
-    `REACH_MODELS`. `quiet_release` is for the symbolic one (see there).
+    what else `save_artifacts` finishes, with `video` a video, too. `reach` and `perception` are among the
+    backend's `REACH_MODELS` and `PERCEPTIONS`. `quiet_release` is for the symbolic one (see there).
     """
     if backend not in BACKENDS:
         raise BackendError(unknown("backend", backend, BACKENDS))
-    reach = reach_model(backend, reach)
+    reach, perception = reach_model(backend, reach), perception_source(backend, perception)
     if backend == "symbolic":
         from cognitive_arch.execution.symbolic import SymbolicEnvironment
 
         return SymbolicEnvironment(domain, scene, rules, noise, jitter, quiet_release)
     module = drake_module("sim.environment")
     environment: Environment = module.DrakeEnvironment(
-        domain, scene, noise=asdict(noise), jitter=jitter, record=record, video=video, reach=reach
+        domain,
+        scene,
+        noise=asdict(noise),
+        jitter=jitter,
+        record=record,
+        video=video,
+        reach=reach,
+        perception=perception,
     )
     return environment
 

@@ -87,6 +87,11 @@ class Environment(Protocol):
         """Look at the world; changes nothing."""
         ...
 
+    def truth(self) -> Observation | None:
+        """What there really is, for those who judge the robot and never for itself; None where `observe`
+        tells it anyway."""
+        ...
+
     def execute(self, action: GroundAction) -> SkillResult:
         """Attempt `action`. An impossible one returns a failure with its reason, it never raises."""
         ...

@@ -105,6 +105,10 @@ class SymbolicEnvironment:
         absent = tuple(name for name in self.scene.things if name not in self._things)
         return Observation(float(self._steps), objects, hands, absent, tuple(sorted(self._properties)))
 
+    def truth(self) -> Observation | None:
+        """See `Environment.truth`: `observe` tells it."""
+        return None
+
     def execute(self, action: GroundAction) -> SkillResult:
         """See `Environment.execute`."""
         self._steps += 1

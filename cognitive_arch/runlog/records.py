@@ -11,13 +11,16 @@ from typing import Any
 
 from cognitive_arch import __version__
 from cognitive_arch.execution.episode import EpisodeResult, Step
-from cognitive_arch.world.state import sorted_atoms
+from cognitive_arch.world.state import StateChange, sorted_atoms
 
 LIBRARIES = ("drake", "icub_models", "numpy", "numba", "lark")
 
 
-def step_record(step: Step) -> dict[str, Any]:
-    """One step as JSON data. Holds nothing that differs between two runs of one seed."""
+def step_record(step: Step, misbelief: StateChange | None = None) -> dict[str, Any]:
+    """One step as JSON data. Holds nothing that differs between two runs of one seed.
+
+    `misbelief` is how the world as the robot believes it to be after the step differs from the real one.
+    """
     atoms = step.before.atoms()
     return {
         "step": step.number,
@@ -46,6 +49,9 @@ def step_record(step: Step) -> dict[str, Any]:
         "effect": step.effect,
         "added": list(step.change.added),
         "removed": list(step.change.removed),
+        "misbelief": None
+        if misbelief is None
+        else {"wrong": list(misbelief.added), "overlooked": list(misbelief.removed)},
     }
 
 

@@ -24,7 +24,7 @@ from typing import Any, TextIO
 from cognitive_arch.errors import StoreError, one_line, unknown
 from cognitive_arch.execution.episode import Step
 from cognitive_arch.runlog.records import step_record
-from cognitive_arch.world.state import WorldState
+from cognitive_arch.world.state import StateChange, WorldState
 from cognitive_arch.world.store import WorldStateStore
 
 DATABASE = "runs.sqlite3"
@@ -253,13 +253,18 @@ class RunWriter:
         self._version = -1
 
     def add_step(
-        self, step: Step, state: dict[str, Any] | None = None, wall_s: float = 0.0
+        self,
+        step: Step,
+        state: dict[str, Any] | None = None,
+        wall_s: float = 0.0,
+        misbelief: StateChange | None = None,
     ) -> dict[str, Any]:
         """Write one step and the world states it brought, in one transaction; returns its record.
 
-        `state` becomes the run's checkpoint; without it the earlier one stays.
+        `state` becomes the run's checkpoint; without it the earlier one stays. `misbelief` is what the robot
+        gets wrong after the step, as far as somebody can tell.
         """
-        record = step_record(step)
+        record = step_record(step, misbelief)
         with self._store._transaction():
             for world in (step.before, step.after):
                 self._add_world(world)
