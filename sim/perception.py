@@ -115,7 +115,8 @@ class Perception(ABC):
         holding = {hand: self.held(hand) for hand in HANDS}
         hands = tuple(HandObservation(hand, name) for hand, name in holding.items())
         holders = {name: hand for hand, name in holding.items() if name is not None}
-        objects = tuple(self._describe(name, holders.get(name)) for name in self.visible())
+        seen = set(self.visible())
+        objects = tuple(self._describe(name, holders.get(name), name in seen) for name in self.names())
         return Observation(self.time, objects, hands, self.absent())
 
     def can_take(self, hand: str, name: str) -> bool:
@@ -150,7 +151,7 @@ class Perception(ABC):
         beside = shape.width / 2 + outer_radius(self._domain.objects[name].shape)
         return shape.bar / 2 >= beside
 
-    def _describe(self, name: str, holder: str | None) -> ObjectObservation:
+    def _describe(self, name: str, holder: str | None, visible: bool) -> ObjectObservation:
         x, y, z = (float(v) for v in self.pose(name).translation())
         spec = self._domain.objects[name]
         tools = [t for t in self.names() if self._domain.objects[t].kind == "tool" and t != name]
@@ -164,6 +165,7 @@ class Perception(ABC):
             reachable_with=(*hands, *by_tool),
             pullable_with=() if hands else tuple(t for t in by_tool if self._hooks(t, name)),
             yaw=self.place(name)[2],
+            visible=visible,
         )
 
 

@@ -30,6 +30,7 @@ from sim.world import World
 PRESSED = 0.001  # m that a pad stays short of its command when something is in its way
 THINNEST = 0.004  # m between pads that hold something
 NEARER, FARTHER = 0.006, 0.010  # m; what is that much nearer than a thing hides it, farther is seen past it
+PART = 0.4  # of a thing's height, the same for thin ones
 HIDDEN = 0.6  # of a thing, above which its place cannot be judged
 SAMPLES = 5  # along each side of a thing
 
@@ -144,11 +145,11 @@ class CameraPerception(Perception):
         return self._feel().on_table(name)
 
     def save(self) -> dict[str, Any]:
-        return {"tracker": self._tracker.to_json()}
+        return {"tracker": self._tracker.to_json(), "looked": self._looked}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         self._tracker.restore(saved["tracker"])
-        self._looked = self._felt = -1.0
+        self._looked, self._felt = float(saved["looked"]), -1.0
 
 
 def _detection(sighting: Sighting) -> Detection:
@@ -156,7 +157,7 @@ def _detection(sighting: Sighting) -> Detection:
         name: Candidate(guess.probability, guess.estimate.matrix(), guess.estimate.sigma)
         for name, guess in sighting.hypotheses.items()
     }
-    return Detection(candidates, sighting.unknown)
+    return Detection(candidates, sighting.unknown, sighting.glimpse)
 
 
 def _judge(image: EyeImage, shape: Shape, X_WO: Pose) -> Place:
@@ -170,7 +171,7 @@ def _judge(image: EyeImage, shape: Shape, X_WO: Pose) -> Place:
     expected = ((points[inside] - camera.position) @ camera.X_WC[:3, :3])[:, 2]
     seen = image.depth[rows, columns]
     hidden = image.own[rows, columns] | (seen < expected - NEARER)
-    past = ~hidden & (seen > expected + FARTHER)
+    past = ~hidden & (seen > expected + min(FARTHER, PART * shape.height))
     if hidden.sum() + (~inside).sum() > HIDDEN * len(points):
         return Place.HIDDEN
     return Place.EMPTY if past.sum() > (~hidden & ~past).sum() else Place.TAKEN

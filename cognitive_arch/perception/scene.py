@@ -62,6 +62,12 @@ class Sighting:
     unknown: float
 
     @property
+    def glimpse(self) -> bool:
+        """Whether so little is seen that its place cannot be told."""
+        name = self.label
+        return name != UNKNOWN and self.hypotheses[name].estimate.seen < SEEN
+
+    @property
     def label(self) -> str:
         """What it is most likely."""
         best = max(self.hypotheses.items(), key=lambda item: item[1].probability, default=None)
@@ -165,7 +171,7 @@ def _sighting(
     hypotheses = {}
     for name, probability in known.items():
         estimate = estimate_pose(shapes[name], region.surface, region.outline)
-        if estimate is not None and estimate.seen >= SEEN:
+        if estimate is not None:
             fits = math.exp(-((estimate.residual / MISFIT) ** 2) / 2)
             hypotheses[name] = Hypothesis(probability * fits, estimate)
     return Sighting(region, hypotheses, max(unknown, POSSIBLE))

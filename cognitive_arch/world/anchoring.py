@@ -78,6 +78,7 @@ class WorldModel:
             on_top_of=seen.below,
             reachable_with=tuple(sorted(seen.reachable_with)),
             pullable_with=tuple(sorted(seen.pullable_with)),
+            visible=seen.visible,
         )
 
 

@@ -15,7 +15,7 @@ HANDS: tuple[str, str] = ("LeftHand", "RightHand")
 
 @dataclass(frozen=True, slots=True)
 class ObjectObservation:
-    """One object in view.
+    """One object in view, or one that is known to be hidden somewhere (not `visible`).
 
     `below` lists the objects it rests on directly (its supports other than the table); `reachable_with`
     the hands and tools that can act on it where it is, `pullable_with` the tools that can draw it closer.
@@ -28,6 +28,7 @@ class ObjectObservation:
     reachable_with: tuple[str, ...] = ()
     pullable_with: tuple[str, ...] = ()
     yaw: float = 0.0
+    visible: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,7 +43,7 @@ class HandObservation:
 class Observation:
     """One look at the world.
 
-    `objects` are those in view, sorted by name; `absent` are objects whose last known place is in view
+    `objects` are those in view or known to be hidden, sorted by name; `absent` are objects whose last known place is in view
     and empty (as opposed to merely hidden); `properties` are further true atoms a domain defines,
     written `isCut(Cake)`.
     """

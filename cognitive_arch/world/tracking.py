@@ -44,10 +44,21 @@ class Candidate:
 
 @dataclass(frozen=True, slots=True)
 class Detection:
-    """Something in view: what it may be, by name, and how likely it is none of these."""
+    """Something in view: what it may be, by name, and how likely it is none of these.
+
+    Of a `glimpse` so little is seen that its place is not to be trusted.
+    """
 
     candidates: Mapping[str, Candidate]
     unknown: float = LEAST
+    glimpse: bool = False
+
+    @property
+    def best(self) -> tuple[str, float]:
+        """What it most likely is, and how likely."""
+        chances = {name: candidate.probability for name, candidate in self.candidates.items()}
+        name = max(chances, key=lambda name: chances[name])
+        return name, chances[name]
 
 
 class Place(Enum):
@@ -94,11 +105,15 @@ class Tracker:
     ) -> None:
         """Fold one look in. `place` tells what is to be seen where a thing should be."""
         self.feel(hands)
-        found = self._associate(detections)
+        found = self._associate([detection for detection in detections if not detection.glimpse])
         for name, candidate in found.items():
             self._see(name, candidate)
-        for name in [name for name in self.tracks if name not in found]:
+        missing = [name for name in self.tracks if name not in found]
+        for name in missing:
             self._miss(name, place)
+        glimpses = dict(d.best for d in detections if d.glimpse and d.candidates)
+        for name in sorted(self.tracks, key=self.bottom):
+            self._explain(name, glimpses, self.gone & set(missing))
         self.gone -= self.tracks.keys()
 
     def feel(self, hands: Mapping[str, HandSense]) -> None:
@@ -140,11 +155,7 @@ class Tracker:
         """The things that one rests on: below it sideways, their upper side at its underside."""
         if self.tracks[name].hand is not None or self.on_table(name):
             return ()
-        below = [
-            (abs(self.bottom(name) - self.top(other)), other)
-            for other, track in self.tracks.items()
-            if other != name and track.hand is None and self._above(name, other)
-        ]
+        below = [(abs(self.bottom(name) - self.top(other)), other) for other in self._below(name)]
         near = [other for gap, other in sorted(below) if gap < TOUCHING]
         return tuple(near or [other for _, other in sorted(below)[:1]])
 
@@ -225,6 +236,36 @@ class Tracker:
         deep = min(self.top(name), self.top(other)) - max(self.bottom(name), self.bottom(other))
         room = min(*self.shapes[name].extent, *self.shapes[other].extent) / 2
         return bool(deep > WITHIN and sideways < room)
+
+    def _explain(self, name: str, glimpses: Mapping[str, float], vanished: set[str]) -> None:
+        """What seems to rest on nothing rests on something hidden: of what is missing, what fits between.
+
+        That is what a glimpse shows, or else the only thing of the right height that has just vanished.
+        """
+        track = self.tracks[name]
+        if track.hand is not None or not track.visible or self.on_table(name):
+            return
+        while True:
+            floor = max([self.table, *(self.top(o) for o in self._below(name))])
+            gap = self.bottom(name) - floor
+            missing = {n for n in self.shapes if n not in self.tracks}
+            heights = {n: self.shapes[n].height for n in missing if self.shapes[n].height < gap + TOUCHING}
+            shown = [n for n in heights if glimpses.get(n, 0.0) > 0.5]
+            fitting = [n for n in vanished & heights.keys() if abs(heights[n] - gap) < TOUCHING / 2]
+            if gap < TOUCHING or not (shown or len(fitting) == 1):
+                return
+            hidden = max(shown, key=lambda n: (-abs(heights[n] - gap), n)) if shown else fitting[0]
+            pose = track.pose.copy()
+            pose[2, 3] = floor + heights[hidden] / 2
+            self.tracks[hidden] = Track(pose, LOOSE / 4, visible=False)
+
+    def _below(self, name: str) -> list[str]:
+        """What is lower than a thing, and under its middle."""
+        return [
+            other
+            for other, track in self.tracks.items()
+            if other != name and track.hand is None and self._above(name, other)
+        ]
 
     # -- keeping ------------------------------------------------------------------------------------------
 
