@@ -203,8 +203,8 @@ def sandwich(first: str, second: str) -> list[GroundAction]:
 
 def stacked(world: DrakeEnvironment) -> bool:
     """Whether contact and pose say that the sandwich is there."""
-    below = {obj.name: obj.below for obj in world.observe().objects}
-    return "Bun-bottom" in below.get("Ham", ()) and "Ham" in below.get("Bun-top", ())
+    supports = world.robot.truth.supports
+    return "Bun-bottom" in supports("Ham") and "Ham" in supports("Bun-top")
 
 
 def attempt(world: DrakeEnvironment, seed: int, hands: tuple[str, str]) -> tuple[bool, list[str]]:
@@ -228,7 +228,7 @@ def task_trial(sentence: str, scene: str, _: str, seed: int, jitter: float) -> T
     """From the sentence to the goal, as `cogarch run` does it; what is measured are the actions."""
     config = RunConfig(scene=scene, seed=seed, jitter=jitter, record=False)
     result, _events = run_logged(sentence, config)
-    return Trial(bool(result["success"]), _told(result), float(result["total"]))
+    return Trial(result["success"] and result["goal_holds"], _told(result), float(result["total"]))
 
 
 DEMO_EVENTS = {  # what the log of a demo must tell of, besides its end
@@ -248,7 +248,7 @@ def demo_trial(name: str, _: str, seed: int, jitter: float) -> Trial:
     tools = [a for a in result["actions"] if a["action"] == "pull"]
     told = set(DEMO_EVENTS[name]) <= set(events) and (name != "out-of-reach" or bool(tools))
     explained = demo.succeeds or bool(result["explanation"])
-    ok = result["success"] is demo.succeeds and told and explained
+    ok = result["success"] is demo.succeeds is result["goal_holds"] and told and explained
     return Trial(ok, (*_told(result), *sorted(set(events))), float(result["total"]))
 
 

@@ -19,6 +19,7 @@ from sim.footprint import Capsule, Point, footprint, on_table, smallest_gap
 from sim.hands import BENDS, PALM_SIGN, SIDES, Posture, limbs
 from sim.kinematics import HandTarget, Vector, palm_axis
 from sim.robot import Robot
+from sim.skills.base import come_down
 from sim.skills.tool import obstacles
 from sim.world import Joints
 
@@ -367,9 +368,12 @@ def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
         return False
 
     robot.go(motion.way)
-    world.follow(motion.down, 0.8, watch)
-    world.follow(motion.along, motion.seconds, watch)
-    world.follow(motion.away, 1.0, watch)
+    if come_down(robot, hand, obj, motion.down, 0.8):
+        world.follow(motion.along, motion.seconds, watch)
+        world.follow(motion.away, 1.0, watch)
+    else:
+        touched = True
+        world.follow([world.command, motion.way[-1]], 0.6)
     robot.go_home(hand)
     return touched
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.world.observation import HANDS
 from sim.hands import STROKE
 from sim.robot import Robot
+from sim.world import Joints
 
 STUCK = 0.5  # s in which what is stuck falls out of an open hand
 
@@ -41,6 +42,22 @@ def let_go_of_lost(robot: Robot) -> None:
         if robot.perception.held(hand) is None:
             release(robot, hand, robot.grips[hand].opening)
             robot.go_home(hand)
+
+
+def come_down(robot: Robot, hand: str, name: str, down: Sequence[Joints], seconds: float) -> bool:
+    """Lower a hand to an object through waypoints; false if it came to lie on it and stopped there.
+
+    Where an object is a little elsewhere than it was believed to be, the fingers would press into it.
+    """
+    felt = False
+
+    def on_it() -> bool:
+        nonlocal felt
+        felt = felt or robot.perception.feels(hand, name)
+        return felt
+
+    robot.world.follow(down, seconds, on_it)
+    return not felt
 
 
 def release(robot: Robot, hand: str, opening: float) -> None:

@@ -15,7 +15,7 @@ from cognitive_arch.world.observation import HANDS
 from sim.hands import FINGER_THICKNESS, FINGER_WIDTH, HANDLE, STROKE, Posture
 from sim.kinematics import DOWN, HandTarget, Vector, palm_axis
 from sim.robot import YAWS, Descent, Grip, Robot
-from sim.skills.base import release
+from sim.skills.base import come_down, release
 from sim.skills.tool import carry_tool
 from sim.world import Joints
 
@@ -68,7 +68,10 @@ def pick_up(
         return FailureReason.BLOCKED if reachable else FailureReason.OUT_OF_REACH, []
     world = robot.world
     robot.go(plan.way)
-    world.follow(plan.down, 1.0)
+    if not come_down(robot, hand, name, plan.down, 1.0):
+        world.follow([world.command, plan.way[-1]], 0.6)
+        robot.go_home(hand)
+        return FailureReason.NOT_GRASPED, []
     world.move_fingers(hand, grip.closed, 0.5)
     world.hold(0.15)
     robot.perception.take_hold(hand, name)
