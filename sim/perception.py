@@ -85,6 +85,10 @@ class Perception(ABC):
         """The last look as an image, with what was made of it; None where there are no eyes."""
         return None
 
+    def descriptors(self, name: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """Shape descriptors of a thing as it was last seen well: of all of it, and of its two halves."""
+        return (), ()
+
     def save(self) -> dict[str, Any]:
         """What is remembered from one look to the next, as plain data."""
         return {}
@@ -156,6 +160,7 @@ class Perception(ABC):
         spec = self._domain.objects[name]
         tools = [t for t in self.names() if self._domain.objects[t].kind == "tool" and t != name]
         hands = [hand for hand in HANDS if holder or self.can_take(hand, name)]
+        desc, tooldesc = self.descriptors(name)
         by_tool = [tool for tool in tools if hands or self._tool_reaches(tool, x, y)]
         return ObjectObservation(
             name=name,
@@ -166,6 +171,8 @@ class Perception(ABC):
             pullable_with=() if hands else tuple(t for t in by_tool if self._hooks(t, name)),
             yaw=self.place(name)[2],
             visible=visible,
+            desc=desc,
+            tooldesc=tooldesc,
         )
 
 

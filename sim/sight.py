@@ -14,6 +14,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cognitive_arch.domain import ReachLimits
+from cognitive_arch.perception.descriptors import describe
 from cognitive_arch.perception.overlay import draw
 from cognitive_arch.perception.pose import outline_distance
 from cognitive_arch.perception.scene import Classify, SceneView, Sighting, sightings
@@ -52,6 +53,7 @@ class CameraPerception(Perception):
         self._table = world.scene.table.height
         self._tracker = Tracker(self._shapes, self._table)
         self._looked, self._felt = -1.0, -1.0
+        self._descriptors: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
         self.image: EyeImage | None = None
         self.sightings: Sequence[Sighting] = ()
 
@@ -69,6 +71,9 @@ class CameraPerception(Perception):
         self.image = image = self._eyes.look(self._world.positions())
         view = SceneView(image.color, image.depth, image.own, image.camera, self._table)
         self.sightings = sightings(view, self._classify, self._shapes)
+        for sighting in self.sightings:
+            if sighting.whole:
+                self._descriptors[sighting.label] = _described(sighting)
         self._tracker.update(
             [_detection(sighting) for sighting in self.sightings],
             self._senses(),
@@ -111,6 +116,9 @@ class CameraPerception(Perception):
         things = set(self._shapes)
         return any(a in links and b in things for a, b in self._world.contacts())
 
+    def descriptors(self, name: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        return self._descriptors.get(name, ((), ()))
+
     def picture(self) -> Pixels | None:
         """See `Perception.picture`: names of what is seen, and crosses for what is remembered."""
         if self.image is None:
@@ -145,10 +153,20 @@ class CameraPerception(Perception):
         return self._feel().on_table(name)
 
     def save(self) -> dict[str, Any]:
-        return {"tracker": self._tracker.to_json(), "looked": self._looked}
+        return {
+            "tracker": self._tracker.to_json(),
+            "looked": self._looked,
+            "descriptors": {
+                name: [list(part) for part in parts] for name, parts in self._descriptors.items()
+            },
+        }
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         self._tracker.restore(saved["tracker"])
+        self._descriptors = {
+            str(name): (tuple(map(float, desc)), tuple(map(float, tooldesc)))
+            for name, (desc, tooldesc) in saved["descriptors"].items()
+        }
         self._looked, self._felt = float(saved["looked"]), -1.0
 
 
@@ -158,6 +176,12 @@ def _detection(sighting: Sighting) -> Detection:
         for name, guess in sighting.hypotheses.items()
     }
     return Detection(candidates, sighting.unknown, sighting.glimpse)
+
+
+def _described(sighting: Sighting) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    found = describe(sighting.region.mask)
+    desc, tooldesc = (found.vector(parts) for parts in (("whole",), ("top", "bottom")))
+    return tuple(map(float, desc)), tuple(map(float, tooldesc))
 
 
 def _judge(image: EyeImage, shape: Shape, X_WO: Pose) -> Place:

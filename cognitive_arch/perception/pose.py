@@ -177,9 +177,12 @@ def _seen(shape: Shape, local: Points) -> float:
     inside = grid[outline_distance(shape)(grid) < -cell / 4]
     if not len(inside):
         return 1.0
-    hit = {(int(a), int(b)) for a, b in np.floor((local + np.array(shape.extent) / 2) / cell)}
-    cells = [(int(a), int(b)) for a, b in np.floor((inside + np.array(shape.extent) / 2) / cell)]
-    return sum(cell in hit for cell in cells) / len(cells)
+
+    def cells(places: Points) -> NDArray[np.int64]:
+        column, row = np.floor((places + np.array(shape.extent) / 2) / cell).astype(np.int64).T
+        return column * 100_003 + row
+
+    return float(np.isin(cells(inside), cells(local)).mean())
 
 
 def outline_distance(shape: Shape) -> Distance:

@@ -32,6 +32,7 @@ SMALLEST = 40  # pixels
 NEARER = 0.006  # m by which what covers an edge is nearer
 MISFIT = 0.003  # m of residual at which a shape becomes unlikely
 SEEN = 0.25  # of a thing, below which its place is not told
+WHOLE = 0.9  # of a thing, from which on its shape is taken to be in view
 POSSIBLE = 1e-3  # probability below which a label is not tried
 
 
@@ -66,6 +67,12 @@ class Sighting:
         """Whether so little is seen that its place cannot be told."""
         name = self.label
         return name != UNKNOWN and self.hypotheses[name].estimate.seen < SEEN
+
+    @property
+    def whole(self) -> bool:
+        """Whether it is known, and nearly all of it in view."""
+        name = self.label
+        return name != UNKNOWN and self.hypotheses[name].estimate.seen > WHOLE
 
     @property
     def label(self) -> str:

@@ -79,6 +79,8 @@ class WorldModel:
             reachable_with=tuple(sorted(seen.reachable_with)),
             pullable_with=tuple(sorted(seen.pullable_with)),
             visible=seen.visible,
+            desc=seen.desc,
+            tooldesc=seen.tooldesc,
         )
 
 

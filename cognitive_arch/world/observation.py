@@ -19,6 +19,7 @@ class ObjectObservation:
 
     `below` lists the objects it rests on directly (its supports other than the table); `reachable_with`
     the hands and tools that can act on it where it is, `pullable_with` the tools that can draw it closer.
+    `desc` are the shape descriptors of all of it, `tooldesc` those of its two halves; none if not seen.
     """
 
     name: str
@@ -29,6 +30,8 @@ class ObjectObservation:
     pullable_with: tuple[str, ...] = ()
     yaw: float = 0.0
     visible: bool = True
+    desc: tuple[float, ...] = ()
+    tooldesc: tuple[float, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -43,9 +46,9 @@ class HandObservation:
 class Observation:
     """One look at the world.
 
-    `objects` are those in view or known to be hidden, sorted by name; `absent` are objects whose last known place is in view
-    and empty (as opposed to merely hidden); `properties` are further true atoms a domain defines,
-    written `isCut(Cake)`.
+    `objects` are those in view or known to be hidden, sorted by name; `absent` are objects whose last known
+    place is in view and empty (as opposed to merely hidden); `properties` are further true atoms that a
+    domain defines, written `isCut(Cake)`.
     """
 
     time: float
