@@ -159,7 +159,7 @@ class SceneView:
 
 def _grown(mask: Mask, raised: Mask) -> Mask:
     """With the pixels back that were lost to the step at its edge."""
-    wider = cv2.dilate(mask.view(np.uint8), np.array([[1, 1, 0], [1, 1, 0], [0, 0, 0]], np.uint8))
+    wider = cv2.dilate(mask.view(np.uint8), np.array([[0, 0, 0], [0, 1, 1], [0, 1, 1]], np.uint8))
     return (wider > 0) & raised
 
 
