@@ -27,6 +27,8 @@ LEAST = 1e-6  # probability
 SAME = 0.008  # m that a thing at rest may seem to move
 DRIFT = 0.002  # m of uncertainty that one look later adds
 LOST = 0.08  # m from where the hand would hold it at which a thing was not in the hand
+SLIPPED = 0.3  # rad by which eyes believe that it has turned in the hand
+EXACT = 0.005  # m of uncertainty up to which eyes tell better than fingers how it is held
 LOOSE = 0.05  # m of uncertainty about what has just left a hand
 IN_HAND = 0.002  # m, of what is in a hand
 TOUCHING = 0.006  # m between an underside and what carries it, as seen
@@ -196,7 +198,7 @@ class Tracker:
         track = self.tracks.get(name)
         if track is not None and track.hand is not None:
             if np.linalg.norm(track.pose[:3, 3] - seen.pose[:3, 3]) < LOST:
-                self.tracks[name] = replace(track, visible=True)
+                self.tracks[name] = _held_as_seen(track, seen)
                 return
             track = None  # it lies somewhere else: the hand has something else, or nothing
         if track is None:
@@ -299,3 +301,24 @@ class Tracker:
             for name, row in saved["tracks"].items()
         }
         self.gone = set(saved["gone"])
+
+
+def _held_as_seen(track: Track, seen: Candidate) -> Track:
+    """How a thing is held, corrected by how it is seen to be: it may have turned as the fingers closed.
+
+    Eyes tell where it is and how it is turned about the vertical; how level it is the hand knows better.
+    """
+    turn = _yaw(seen.pose) - _yaw(track.pose)
+    turn = (turn + math.pi / 2) % math.pi - math.pi / 2  # many things look the same from behind
+    if track.in_hand is None or seen.sigma > EXACT or abs(turn) > SLIPPED:
+        return replace(track, visible=True)
+    X_WH = track.pose @ np.linalg.inv(track.in_hand)
+    pose = track.pose.copy()
+    c, s = math.cos(turn), math.sin(turn)
+    pose[:2, :3] = np.array(((c, -s), (s, c))) @ track.pose[:2, :3]
+    pose[:3, 3] = seen.pose[:3, 3]
+    return replace(track, pose=pose, visible=True, in_hand=np.linalg.inv(X_WH) @ pose)
+
+
+def _yaw(pose: Pose) -> float:
+    return math.atan2(pose[1, 0], pose[0, 0])

@@ -27,6 +27,7 @@ def sweep_with_tool(
     reason = unusable(robot, obj, name, hand)
     if reason is not None:
         return reason
+    robot.perception.look()  # a tool may have turned in the hand
     tool = held_tool(robot, name, hand)
     if with_bar and (tool is None or tool.shape.bar <= 0):
         return FailureReason.CANNOT_PULL
@@ -61,5 +62,8 @@ def _regrip(robot: Robot, tool: HeldTool, plan: Callable[[HeldTool], Motion | No
         if abs(other.grip - tool.grip) >= SAME and plan(other) is not None:
             reason = set_down(robot, tool.hand, lay_targets(robot, tool, inset))
             robot.perception.look()
-            return reason if reason is not FailureReason.NONE else take(robot, tool.name, tool.hand, (inset,))
+            if reason is FailureReason.NONE:
+                reason = take(robot, tool.name, tool.hand, (inset,))
+                robot.perception.look()
+            return reason
     return FailureReason.OUT_OF_REACH
