@@ -167,7 +167,7 @@ def test_what_is_added_can_be_used_and_what_is_removed_is_gone(stage: Environmen
     assert stage.execute(action("graspWith(Cheese,RightHand)")).reason is FailureReason.UNKNOWN_OBJECT
     assert happen(stage, "remove:Cheese") == ()
     work(stage, "graspWith(Ham,LeftHand)")
-    assert "Cheese" in stage.reset(0).absent
+    assert "Cheese" not in {obj.name for obj in stage.reset(0).objects}
 
 
 def test_a_layer_that_is_moved_lets_the_ones_above_sink(environment: Environment) -> None:

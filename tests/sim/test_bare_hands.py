@@ -140,7 +140,7 @@ def test_refusals_move_nothing(crowded: DrakeEnvironment, call: str, reason: Fai
 )
 def test_what_a_bare_hand_does(domain: Domain, what: str, hand: str, posture: Posture) -> None:
     """It moves the object the right way (or not at all), and nothing else."""
-    environment = DrakeEnvironment(domain, bare_scene("Bun-bottom", hand), jitter=0.02)
+    environment = DrakeEnvironment(domain, bare_scene("Bun-bottom", hand), jitter=0.02, perception="oracle")
     environment.recorder.keep = True
     trial = use_hand(environment, what, posture, "Bun-bottom", hand, 0)
     assert trial.ok, trial.said
@@ -150,7 +150,7 @@ def test_what_a_bare_hand_does(domain: Domain, what: str, hand: str, posture: Po
 @pytest.mark.physics
 def test_straight_fingers_pull_nothing(domain: Domain) -> None:
     """The level hand passes over the object: bending the fingers is what makes the difference."""
-    environment = DrakeEnvironment(domain, bare_scene("Bun-bottom", "RightHand"))
+    environment = DrakeEnvironment(domain, bare_scene("Bun-bottom", "RightHand"), perception="oracle")
     moved = {}
     for posture in (Posture.STRAIGHT, Posture.ARCHED):
         environment.reset(0)

@@ -23,7 +23,7 @@ from tests.conftest import action
 
 @pytest.fixture(scope="module")
 def simple(domain: Domain) -> DrakeEnvironment:
-    environment = DrakeEnvironment(domain, load_scene("simple"))
+    environment = DrakeEnvironment(domain, load_scene("simple"), perception="oracle")
     environment.reset(0)
     return environment
 
@@ -112,7 +112,7 @@ def walled_in() -> DrakeEnvironment:
         names[3]: Placement(position=(x - 0.055, y), yaw=math.pi / 2),
         "Small-box": Placement(position=(x, y)),
     }
-    return DrakeEnvironment(domain, Scene(name="walled", domain="toys", objects=places))
+    return DrakeEnvironment(domain, Scene(name="walled", domain="toys", objects=places), perception="oracle")
 
 
 def test_behind_a_wall_of_others() -> None:
@@ -144,7 +144,7 @@ def test_off_the_table(tmp_path: Path) -> None:
 
 @pytest.mark.physics
 def test_a_tool_is_laid_down_flat_and_taken_elsewhere(domain: Domain) -> None:
-    environment = DrakeEnvironment(domain, load_scene("complex"))
+    environment = DrakeEnvironment(domain, load_scene("complex"), perception="oracle")
     environment.reset(0)
     assert environment.execute(action("graspWith(Rake,RightHand)")).outcome is Outcome.SUCCESS
     robot = environment.robot

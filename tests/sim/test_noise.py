@@ -128,7 +128,9 @@ def test_a_weak_grip_is_seldom_a_very_weak_one() -> None:
 
 @pytest.fixture(scope="module")
 def noisy(domain: Domain) -> DrakeEnvironment:
-    return DrakeEnvironment(domain, load_scene("simple"), noise={"left": 0.5, "pull": 0.5})
+    return DrakeEnvironment(
+        domain, load_scene("simple"), noise={"left": 0.5, "pull": 0.5}, perception="oracle"
+    )
 
 
 def frictions(environment: DrakeEnvironment, side: str) -> set[float]:
@@ -163,7 +165,7 @@ def test_an_episode_draws_for_noisy_arms_only(noisy: DrakeEnvironment) -> None:
 
 
 def test_without_noise_nothing_is_drawn_and_nothing_changes(domain: Domain) -> None:
-    environment = DrakeEnvironment(domain, load_scene("simple"), noise={"left": 0.0})
+    environment = DrakeEnvironment(domain, load_scene("simple"), noise={"left": 0.0}, perception="oracle")
     environment.reset(3)
     state = environment.robot.rng.bit_generator.state
     noise, world = environment.robot.noise, environment.world
@@ -196,7 +198,7 @@ def test_what_was_drawn_is_saved_and_restored(noisy: DrakeEnvironment, domain: D
     assert noisy.robot.noise.save() == drawn
     assert frictions(noisy, "l") == friction
     assert noisy.save() == saved
-    clean = DrakeEnvironment(domain, load_scene("simple"))
+    clean = DrakeEnvironment(domain, load_scene("simple"), perception="oracle")
     with pytest.raises(StateError, match="noise of LeftHand"):
         clean.restore(saved)
 
@@ -219,7 +221,7 @@ def test_the_composition_is_told(domain: Domain, rules: RuleSet, cogarch: Any) -
 @pytest.mark.physics
 def test_a_grip_without_force_lets_the_object_slip(domain: Domain) -> None:
     limp = PhysicalNoise({"left": 1.0}, arm=(WeakGrip(power=1000.0),))
-    environment = DrakeEnvironment(domain, load_scene("simple"), noise=limp)
+    environment = DrakeEnvironment(domain, load_scene("simple"), noise=limp, perception="oracle")
     environment.reset(0)
     result = environment.execute(action("graspWith(Ham,LeftHand)"))
     assert result.outcome is Outcome.FAILURE
@@ -229,7 +231,7 @@ def test_a_grip_without_force_lets_the_object_slip(domain: Domain) -> None:
 @pytest.mark.physics
 def test_a_head_that_is_too_high_passes_over_the_object(domain: Domain) -> None:
     high = PhysicalNoise({"pull": 1.0}, pull=(HeadLift(sigma=0.1),))
-    environment = DrakeEnvironment(domain, load_scene("complex"), noise=high)
+    environment = DrakeEnvironment(domain, load_scene("complex"), noise=high, perception="oracle")
     environment.reset(0)
     assert environment.execute(action("graspWith(Rake,RightHand)")).outcome is Outcome.SUCCESS
     result = environment.execute(action("pull(Ham,Rake,RightHand)"))
