@@ -15,6 +15,7 @@ from cognitive_arch.affordances.networks import NetworkModel
 from cognitive_arch.affordances.published import READERS, read_published
 from cognitive_arch.affordances.queries import Oracle, Place, Thing, goal_mask, matrix_text
 from cognitive_arch.affordances.registry import BASELINES, MODELS, Affordances
+from cognitive_arch.affordances.sight import HALVES, is_picture, seen_thing
 from cognitive_arch.affordances.trials import ACTIONS, BINS, Floats, TrialTable, read_trials
 from cognitive_arch.errors import AffordanceError, one_line, unknown
 
@@ -151,7 +152,8 @@ def _verdict(rows: Sequence[Mapping[str, Any]]) -> list[str]:
 
 @dataclass(frozen=True)
 class Question:
-    """What is given; None is left open. `tools` are candidates to choose from."""
+    """What is given; None is left open. `tools` are candidates to choose from. Of a manipulator that is seen
+    in a picture the `half` counts that will touch the object; `formulas` are those of its descriptors."""
 
     action: str | None = None
     manipulator: str | None = None
@@ -159,6 +161,8 @@ class Question:
     start: Place | None = None
     goal: str | None = None
     tools: tuple[str, ...] = ()
+    half: str = "top"
+    formulas: str = "shapeDescriptor"
 
 
 def parse_place(text: str | None) -> Place | None:
@@ -179,8 +183,10 @@ def parse_place(text: str | None) -> Place | None:
 def ask(learned: Affordances, question: Question, picture: Path | None = None) -> dict[str, Any]:
     """Effects if nothing is wished for; else the best tool (with an action and no manipulator), or action."""
     oracle = Oracle(learned)
-    m = oracle.manipulator(question.manipulator) if question.manipulator else None
-    o = oracle.object(question.object) if question.object else None
+    if question.half not in HALVES:
+        raise AffordanceError(unknown("half", question.half, HALVES))
+    m = _manipulator(oracle, question, question.manipulator) if question.manipulator else None
+    o = _object(oracle, question, question.object) if question.object else None
     if question.action is not None and question.action not in (*ACTIONS, "draw"):
         raise AffordanceError(unknown("action", question.action, ACTIONS))
     answer: dict[str, Any] = {
@@ -208,6 +214,18 @@ def ask(learned: Affordances, question: Question, picture: Path | None = None) -
     return answer
 
 
+def _manipulator(oracle: Oracle, question: Question, text: str) -> Thing:
+    if is_picture(text):
+        return seen_thing(text, question.half, oracle.learned.names_m, question.formulas)
+    return oracle.manipulator(text)
+
+
+def _object(oracle: Oracle, question: Question, text: str) -> Thing:
+    if is_picture(text):
+        return seen_thing(text, "whole", oracle.learned.names_o, question.formulas)
+    return oracle.object(text)
+
+
 def _choose(
     oracle: Oracle, question: Question, m: Thing | None, o: Thing | None, answer: dict[str, Any]
 ) -> dict[str, Floats]:
@@ -216,7 +234,7 @@ def _choose(
     goal, start = goal_mask(question.goal), question.start
     if question.action is not None and m is None:
         names = question.tools or tuple(oracle.learned.things_m)
-        tools = [oracle.manipulator(name) for name in names]
+        tools = [_manipulator(oracle, question, name) for name in names]
         ranked = oracle.select_tool(goal, question.action, tools, o, start)
         cases = {
             f"{question.action} with {t.name}": oracle.predict(question.action, t, o, start) for t in tools

@@ -16,7 +16,7 @@ from cognitive_arch.affordances.features import polar, soft_bins
 from cognitive_arch.affordances.trials import ACTIONS, N_BINS, Floats, Ints, TrialTable
 
 LEAF = -1
-TREES = 64
+TREES = 50
 
 
 @dataclass(frozen=True, eq=False)

@@ -109,7 +109,10 @@ class SoftmaxCPD:
             (o, p.object, p.object * p.shared),
         ]
         if np.isfinite(self.scale_s.centre).all() and (self.scale_s.width != 1.0).any():
-            blocks += [(s, p.start, p.start * p.shared), (products(m, s), p.start * p.interplay, 0.0)]
+            blocks += [
+                (s, p.start, p.start * p.shared),
+                (products(m, s[:, :2]), p.start * 2 * p.interplay, 0.0),
+            ]
         widths = [(np.full(b.shape[1], own), np.full(b.shape[1], shared)) for b, own, shared in blocks]
         return (
             np.hstack([b for b, _, _ in blocks]),

@@ -9,7 +9,10 @@ import typer
 
 from cognitive_arch.verbs.common import Json, print_answer
 
-DESCRIBED = "by name or by its descriptors, such as convexity=0.9,eccentricity=0.4,..."
+DESCRIBED = (
+    "by name, by its descriptors (convexity=0.9,eccentricity=0.4,...), or as seen in a picture: "
+    "FILE for the largest blob, FILE#2 for the second from the top"
+)
 
 
 def query(
@@ -34,6 +37,12 @@ def query(
     tools: Annotated[
         str | None, typer.Option(help="Tools to choose from, separated by commas [default: all known].")
     ] = None,
+    half: Annotated[
+        str, typer.Option(help="Which half of a seen manipulator touches the object: top or bottom.")
+    ] = "top",
+    formulas: Annotated[
+        str, typer.Option(help="Formulas of descriptors in pictures: shapeDescriptor or blobDescriptor.")
+    ] = "shapeDescriptor",
     picture: Annotated[
         Path | None, typer.Option(metavar="FILE", help="Draw the effects on the table (.png, .svg).")
     ] = None,
@@ -50,6 +59,8 @@ def query(
         start=answers.parse_place(start),
         goal=goal,
         tools=tuple(part.strip() for part in tools.split(",")) if tools else (),
+        half=half,
+        formulas=formulas,
     )
     answer = answers.ask(Affordances.load(learned), question, picture)
     print_answer(answer, answers.ask_text(answer), as_json)

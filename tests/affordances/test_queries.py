@@ -158,6 +158,26 @@ def test_learn_and_ask_from_the_command_line(cogarch: Any, files: Path) -> None:
     assert np.sum(found.json["effects"]) == pytest.approx(1.0)
 
 
+def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tmp_path: Path) -> None:
+    import cv2
+
+    picture = np.full((240, 320, 3), 150, np.uint8)
+    cv2.rectangle(picture, (140, 60), (152, 200), (20, 30, 200), -1)
+    cv2.circle(picture, (60, 120), 22, (200, 60, 20), -1)
+    cv2.imwrite(str(tmp_path / "view.png"), picture)
+    learned.save(tmp_path / "model.json")
+    view = str(tmp_path / "view.png")
+    arguments = ["query", str(tmp_path / "model.json"), "--action", "pull", "--json"]
+    found = cogarch(*arguments, "--manipulator", f"{view}#1", "--object", f"{view}#2")
+    assert found.code == 0
+    assert found.json["asked"]["manipulator"] == "view.png#1"
+    assert np.sum(found.json["effects"]) == pytest.approx(1.0)
+    for wrong, message in ((f"{view}#9", "valid: 1 to 2"), ("none.png", "none.png")):
+        found = cogarch(*arguments, "--object", wrong)
+        assert (found.code, len(found.err.splitlines())) == (2, 1)
+        assert message in found.err
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
