@@ -5,8 +5,8 @@
 The parts are the action's own distribution (a Dirichlet estimate), the hierarchical softmax and the ensemble
 of tree CPDs. The weights are found by expectation-maximisation on predictions for trials that the parts have
 not seen: folds of the training trials, by object where there are enough of them, for it is new things that
-the robot asks about. So is one exponent that makes the distributions as sure as they are right, and the
-dependence between the two effects.
+the robot asks about. So is one exponent per action, which makes the distributions as sure as they are right,
+and the dependence between the two effects.
 """
 
 from __future__ import annotations
@@ -28,6 +28,8 @@ OBJECTS_FOR_FOLDS = 6
 """With at least so many objects each fold holds out some of them entirely."""
 MOST_ROWS = 4000
 TREES_FOR_WEIGHTS = 24
+EXPONENT_WIDTH = 0.5
+"""Prior standard deviation of the logarithm of an exponent."""
 PLACES = 48
 """Places kept to average over where the place is not told."""
 
@@ -56,14 +58,14 @@ class ActionCPD:
 
 @dataclass(eq=False)
 class MixtureModel:
-    """`weights` (3,) of the parts, `exponent` (sharper above 1), `ratio` (actions, 5, 5) the
+    """`weights` (3,) of the parts, `exponents` (actions,) (sharper above 1), `ratio` (actions, 5, 5) the
     dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
 
     action: ActionCPD
     softmax: SoftmaxCPD
     forest: ForestCPD
     weights: Floats
-    exponent: float
+    exponents: Floats
     ratio: Floats
     places: Floats
     seen: TrialTable | None = None
@@ -80,12 +82,12 @@ class MixtureModel:
         held_out = _held_out(table, rng, parts[1])
         weights = _weights(held_out, table.bins)
         mixed = np.einsum("k,knxb->nxb", weights, held_out)
-        exponent = _exponent(mixed, table.bins)
-        ratio = coupling(_sharpened(mixed, exponent), table)
+        exponents = _exponents(mixed, table)
+        ratio = coupling(_sharpened(mixed, exponents[table.action]), table)
         places = table.start[np.isfinite(table.start).all(axis=1)]
         if len(places) > PLACES:
             places = places[rng.choice(len(places), PLACES, replace=False)]
-        return cls(*parts, weights, exponent, ratio, places, table)
+        return cls(*parts, weights, exponents, ratio, places, table)
 
     def joint(self, table: TrialTable) -> Floats:
         """See `EffectModel`."""
@@ -105,7 +107,7 @@ class MixtureModel:
 
     def _joint(self, table: TrialTable) -> Floats:
         each = _marginals((self.action, self.softmax, self.forest), table)
-        mixed = _sharpened(np.einsum("k,knxb->nxb", self.weights, each), self.exponent)
+        mixed = _sharpened(np.einsum("k,knxb->nxb", self.weights, each), self.exponents[table.action])
         return coupled(mixed, self.ratio[table.action])
 
     def update(self, table: TrialTable, rng: np.random.Generator) -> None:
@@ -123,7 +125,7 @@ class MixtureModel:
             "softmax": self.softmax.to_json(),
             "forest": self.forest.to_json(),
             "weights": self.weights.tolist(),
-            "exponent": self.exponent,
+            "exponents": self.exponents.tolist(),
             "ratio": self.ratio.tolist(),
             "places": self.places.tolist(),
         }
@@ -136,7 +138,7 @@ class MixtureModel:
             SoftmaxCPD.from_json(data["softmax"]),
             ForestCPD.from_json(data["forest"]),
             np.array(data["weights"]),
-            float(data["exponent"]),
+            np.array(data["exponents"]),
             np.array(data["ratio"]),
             np.array(data["places"]).reshape(-1, 2),
         )
@@ -201,18 +203,29 @@ def _weights(held_out: Floats, bins: Ints, steps: int = 100) -> Floats:
     return weights
 
 
-def _sharpened(marginals: Floats, exponent: float) -> Floats:
-    raised = marginals**exponent
+def _sharpened(marginals: Floats, exponent: Floats) -> Floats:
+    """Marginals (n, 2, 5) to the power of `exponent` (n,), normalised again."""
+    raised = marginals ** exponent[:, None, None]
     sharpened: Floats = raised / raised.sum(axis=2, keepdims=True)
     return sharpened
 
 
+def _exponents(marginals: Floats, table: TrialTable) -> Floats:
+    """For each action the exponent under which the held-out bins are most likely, (actions,)."""
+    found = np.ones(len(ACTIONS))
+    for action in range(len(ACTIONS)):
+        rows = table.action == action
+        if rows.any():
+            found[action] = _exponent(marginals[rows], table.bins[rows])
+    return found
+
+
 def _exponent(marginals: Floats, bins: Ints) -> float:
-    """The exponent under which the held-out bins are most likely."""
     rows = np.arange(len(bins))
 
     def loss(log_exponent: float) -> float:
-        p = _sharpened(marginals, float(np.exp(log_exponent)))
-        return -sum(float(np.log(p[rows, axis, bins[:, axis]] + 1e-12).sum()) for axis in range(2))
+        p = _sharpened(marginals, np.full(len(bins), np.exp(log_exponent)))
+        found = sum(np.log(p[rows, axis, bins[:, axis]] + 1e-12).sum() for axis in range(2))
+        return 0.5 * (log_exponent / EXPONENT_WIDTH) ** 2 - float(found)
 
-    return float(np.exp(minimize_scalar(loss, bounds=(-0.7, 0.7), method="bounded").x))
+    return float(np.exp(minimize_scalar(loss, bounds=(-1.1, 1.1), method="bounded").x))
