@@ -10,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from cognitive_arch.affordances.evaluation import evaluate
+from cognitive_arch.affordances.evaluation import Evaluation, evaluate
+from cognitive_arch.affordances.metrics import confidences, reliability
+from cognitive_arch.affordances.model import marginals_of
 from cognitive_arch.affordances.networks import NetworkModel
 from cognitive_arch.affordances.published import READERS, read_published
 from cognitive_arch.affordances.queries import Oracle, Place, Thing, goal_mask, matrix_text
@@ -33,10 +35,11 @@ def load_table(trials: str, data: Path | None) -> TrialTable:
 
 @dataclass(frozen=True)
 class Study:
-    """How to evaluate: `splits` 0 for not at all."""
+    """How to evaluate: `splits` 0 for not at all; a reliability diagram goes to `figure`."""
 
     protocol: str = "trial"
     splits: int = 0
+    figure: Path | None = None
     beside: tuple[str, ...] = BASELINES
 
 
@@ -80,11 +83,28 @@ def learn(
         answer["complexity"] = structure.complexity
     if study.splits:
         answer["protocol"] = study.protocol
-        answer["evaluation"] = []
-        for name in dict.fromkeys((model, *study.beside)):
-            notice(f"evaluating {name}")
-            answer["evaluation"].append(evaluate(table, name, study.protocol, study.splits, seed).to_json())
+        found = _evaluations(table, model, study, seed, notice)
+        answer["evaluation"] = [one.to_json() for one in found]
+        if study.figure is not None:
+            answer["files"].append(str(_reliability(found, study.figure)))
     return answer
+
+
+def _evaluations(table: TrialTable, model: str, study: Study, seed: int, notice: Notice) -> list[Evaluation]:
+    found = []
+    for name in dict.fromkeys((model, *study.beside)):
+        notice(f"evaluating {name}")
+        found.append(evaluate(table, name, study.protocol, study.splits, seed))
+    return found
+
+
+def _reliability(found: Sequence[Evaluation], path: Path) -> Path:
+    """How often the predicted bin came about, against how sure the model was."""
+    from cognitive_arch.affordances.figures import reliability_picture
+
+    return reliability_picture(
+        {one.model: reliability(*confidences(marginals_of(one.joint), one.bins)) for one in found}, path
+    )
 
 
 def _graph(learned: Affordances, path: Path) -> Path:

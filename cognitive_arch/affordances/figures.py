@@ -33,7 +33,9 @@ def _save(figure: Figure, path: Path | str) -> Path:
         raise AffordanceError(f"'{one_line(path.name)}' is no picture; valid: {', '.join(PICTURES)}")
     path.parent.mkdir(parents=True, exist_ok=True)
     # No date: the same numbers give the same file.
-    figure.savefig(path, dpi=110, metadata={"Date": None} if path.suffix == ".svg" else None)
+    figure.savefig(
+        path, dpi=110, bbox_inches="tight", metadata={"Date": None} if path.suffix == ".svg" else None
+    )
     return path
 
 

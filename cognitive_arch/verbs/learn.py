@@ -81,6 +81,10 @@ def networks(
             "of one trial on both sides)."
         ),
     ] = "trial",
+    reliability: Annotated[
+        Path | None,
+        typer.Option(metavar="FILE", help="Draw how sure it was against how right (.png, .svg)."),
+    ] = None,
     data: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder with the published tables.")
     ] = None,
@@ -95,12 +99,14 @@ def networks(
         raise ConfigError(f"{evaluate} splits; valid: 0 (do not measure) or more")
     if protocol not in evaluation.PROTOCOLS:
         raise ConfigError(unknown("protocol", protocol, evaluation.PROTOCOLS))
+    if reliability is not None and not evaluate:
+        raise ConfigError("--reliability needs --evaluate SPLITS")
     answer = answers.learn(
         answers.load_table(trials, data),
         model,
         out,
         graph,
-        answers.Study(protocol, evaluate),
+        answers.Study(protocol, evaluate, reliability),
         seed,
         lambda text: print(text, file=sys.stderr),
     )

@@ -139,12 +139,14 @@ def test_learn_and_ask_from_the_command_line(cogarch: Any, files: Path) -> None:
     found = cogarch(
         "learn", "networks", str(files / "trials.csv"), "--model", "bde", "--out", str(model),
         "--graph", str(files / "graph.svg"), "--evaluate", "2", "--json",
+        "--reliability", str(files / "reliability.png"),
     )  # fmt: skip
     answer: dict[str, Any] = found.json
     assert found.code == 0
     assert answer["trials"] == 400
     assert [row["model"] for row in answer["evaluation"]] == ["bde", "majority", "forest", "logistic"]
     assert (files / "graph.svg").exists()
+    assert (files / "reliability.png").stat().st_size > 5000
     found = cogarch(
         "query", str(model), "--action", "pull", "--goal", "closer", "--object", "box", "--json",
         "--picture", str(files / "effects.png"),
@@ -186,6 +188,7 @@ def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tm
         (["learn", "networks", "TRIALS", "--model", "best"], "unknown model 'best'"),
         (["learn", "networks", "TRIALS", "--protocol", "none"], "unknown protocol 'none'"),
         (["learn", "networks", "TRIALS", "--model", "forest", "--out", "f.json"], "for comparison"),
+        (["learn", "networks", "TRIALS", "--reliability", "r.png"], "needs --evaluate"),
         (["query", "TRIALS"], "is no learned model"),
         (["reproduce", "table8"], "never published"),
         (["reproduce", "table10"], "never published"),
