@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
@@ -21,6 +23,14 @@ MAX_COMPLETIONS = 3_000_000
 FORMAT = "cogarch-network-1"
 PRIOR = 0.5
 """Pseudo-counts of every entry (the Dirichlet parameter minus 1)."""
+
+
+@contextmanager
+def _quietly() -> Iterator[None]:
+    """pgmpy warns of its own deprecated modules when it is imported."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", FutureWarning)
+        yield
 
 
 @dataclass
@@ -94,8 +104,9 @@ class DiscreteNetwork:
 
     def pgmpy(self) -> Any:
         """The same network as pgmpy's."""
-        from pgmpy.factors.discrete import TabularCPD
-        from pgmpy.models import DiscreteBayesianNetwork
+        with _quietly():
+            from pgmpy.factors.discrete import TabularCPD
+            from pgmpy.models import DiscreteBayesianNetwork
 
         if self.structure.complexity > MAX_DENSE:
             raise AffordanceError(
@@ -122,7 +133,8 @@ class DiscreteNetwork:
 
     def infer(self, targets: Sequence[str], evidence: Mapping[str, int]) -> Floats:
         """p(targets | evidence), exactly, with one axis per target; whatever else there is, is summed out."""
-        from pgmpy.inference import VariableElimination
+        with _quietly():
+            from pgmpy.inference import VariableElimination
 
         for node in (*targets, *evidence):
             if node not in self.structure.states:
@@ -174,7 +186,8 @@ class DiscreteNetwork:
         if path.suffix == ".json":
             path.write_text(json.dumps(self.to_json()) + "\n", encoding="utf-8")
         elif path.suffix == ".bif":
-            from pgmpy.readwrite import BIFWriter
+            with _quietly():
+                from pgmpy.readwrite import BIFWriter
 
             BIFWriter(self.pgmpy()).write(filename=str(path))
         else:
@@ -203,7 +216,8 @@ ESS = 1e6
 
 
 def _from_bif(path: Path) -> DiscreteNetwork:
-    from pgmpy.readwrite import BIFReader
+    with _quietly():
+        from pgmpy.readwrite import BIFReader
 
     read = BIFReader(str(path)).get_model()
     cpds = {str(cpd.variable): cpd for cpd in read.get_cpds()}

@@ -115,17 +115,6 @@ class TrialTable:
             effect=self.effect[rows],
         )
 
-    def shape_of(self, name: str) -> tuple[str, Floats]:
-        """What a name stands for: `manipulator` or `object`, and its mean descriptors, (a,) or (c,)."""
-        for what, names, shapes in (
-            ("manipulator", self.manipulator, self.shape_m),
-            ("object", self.object, self.shape_o),
-        ):
-            rows = names == name
-            if rows.any():
-                return what, shapes[rows].mean(axis=0)
-        raise AffordanceError(unknown("thing", name, {*self.manipulator, *self.object}))
-
     def augmented(self) -> TrialTable:
         """Every pair of views as a row of its own, under its trial's number (thesis Sec. 5.4.2.1)."""
         if self.views_m is None or self.views_o is None:
