@@ -42,7 +42,7 @@ lint: setup
 bench: setup
 	$(PY) benchmarks/run.py
 	$(PY) -m benchmarks.planner
-	$(PY) -m benchmarks.perception
+	$(PY) -m benchmarks.perception --quick
 	$(PY) -m benchmarks.sweep
 
 clean:

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import published_descriptors
+from cognitive_arch.domain import domain_names
 from cognitive_arch.perception.descriptors import describe
 from cognitive_arch.perception.images import read_image, read_mask
 from cognitive_arch.perception.labelling import label_blobs
@@ -163,7 +164,29 @@ def shapes(data: Path) -> Iterator[Row]:
         yield Row("  ours within the published range", f"{within:.0%}")
 
 
-SECTIONS: dict[str, Callable[[Path], Iterator[Row]]] = {"speed": speed, "masks": masks, "shapes": shapes}
+def recognition(data: Path) -> Iterator[Row]:
+    """How well regions are recognised (`benchmarks.recognition`)."""
+    from benchmarks import recognition as names
+
+    for domain in domain_names():
+        yield from (Row(*row) for row in names.rows(domain, names.VIEWS, names.SEED))
+
+
+def scenes(data: Path) -> Iterator[Row]:
+    """How well the robot knows its table (`benchmarks.sight`)."""
+    from benchmarks import sight
+
+    yield from (Row(*row) for row in sight.rows())
+
+
+SECTIONS: dict[str, Callable[[Path], Iterator[Row]]] = {
+    "speed": speed,
+    "masks": masks,
+    "shapes": shapes,
+    "recognition": recognition,
+    "scenes": scenes,
+}
+QUICK = ("speed", "masks", "shapes")  # the others take minutes
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -173,8 +196,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument(
         "--data", type=Path, default=Path(os.environ.get("COGARCH_DATA", ROOT.parent / "shared" / "data"))
     )
+    parser.add_argument("--quick", action="store_true", help=f"only {', '.join(QUICK)}")
     options = parser.parse_args(arguments)
-    names = options.what.split(",") if options.what else list(SECTIONS)
+    names = options.what.split(",") if options.what else list(QUICK if options.quick else SECTIONS)
     for name in names:
         if name not in SECTIONS:
             parser.error(f"unknown section '{name}'; valid: {', '.join(SECTIONS)}")

@@ -17,6 +17,7 @@ from cognitive_arch.evaluation.recognition import score
 from cognitive_arch.perception.recognition import ObjectRecogniser, load_recogniser, recogniser_path
 from sim.views import examples
 
+VIEWS, SEED = 200, 2024
 GOALS = {"known_right": 0.99, "unknown_right": 0.90}
 
 
@@ -61,8 +62,8 @@ def rows(domain_name: str, views: int, seed: int) -> list[tuple[str, str, str]]:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--views", type=int, default=200)
-    parser.add_argument("--seed", type=int, default=2024)
+    parser.add_argument("--views", type=int, default=VIEWS)
+    parser.add_argument("--seed", type=int, default=SEED)
     options = parser.parse_args()
     for name in domain_names():
         for what, measured, goal in rows(name, options.views, options.seed):

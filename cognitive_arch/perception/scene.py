@@ -17,14 +17,13 @@ from numpy.typing import NDArray
 
 from cognitive_arch.perception.camera import Camera
 from cognitive_arch.perception.pose import PoseEstimate, estimate_pose
+from cognitive_arch.perception.segmentation import DepthSegmenter
 from cognitive_arch.shapes import Shape
 
 Mask = NDArray[np.bool_]  # (height, width)
 Classify = Callable[[NDArray[np.uint8], Mask], list[tuple[str, float]]]
 UNKNOWN = "unknown"
 
-RISE = 0.004  # m above the table at which a thing begins
-CEILING = 0.45  # m above the table at which the world ends
 STEP = 0.006  # m of height between neighbouring pixels of different things
 SHADE = 0.02  # of chromaticity between neighbouring pixels of different things
 DARK = 120.0  # sum of the three colours below which chromaticity means less
@@ -98,8 +97,8 @@ class SceneView:
 
     def raised(self) -> Mask:
         """What rises above the table and is not the robot itself."""
-        height = np.nan_to_num(self.points[:, :, 2], nan=-1.0) - self.table
-        return (height > RISE) & (height < CEILING) & ~self.own
+        segmenter = DepthSegmenter(self.camera, self.table)
+        return segmenter.segment(self.color, self.own, self.depth) > 0
 
     def regions(self) -> Iterator[Region]:
         """The things in view, cut apart."""
