@@ -6,6 +6,8 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
+from pathlib import Path
+from typing import NamedTuple
 
 from cognitive_arch.evaluation.rows import Row
 from cognitive_arch.evaluation.sweep import Cell, Job, SweepConfig
@@ -18,16 +20,35 @@ from cognitive_arch.planning.registry import make_planner
 from cognitive_arch.session import RunConfig, Session, Setting, Task
 
 
-def run_job(config: SweepConfig, job: Job, remember: bool = True) -> list[Row]:
-    """The rows of one job; they depend on nothing but `config` and `job`, `wall_s` aside."""
+def run_job(config: SweepConfig, job: Job, remember: bool = True, shared: Path | None = None) -> list[Row]:
+    """The rows of one job; they depend on nothing but `config` and `job`, `wall_s` aside.
+
+    Plans are remembered, and shared with other processes through the folder `shared`.
+    """
+    order = list(range(job.first, job.end))
+    # Jobs that run side by side begin with different planning seeds, so as not to plan the same at one time.
+    turn = 2 * (job.first // len(order)) % len(order)
     with _environment(config, job.cell) as environment:
-        return [_episode(config, job.cell, n, environment, remember) for n in range(job.first, job.end)]
+        return sorted(
+            (
+                _episode(config, job.cell, n, environment, _Memory(remember, shared))
+                for n in order[turn:] + order[:turn]
+            ),
+            key=lambda row: row.episode,
+        )
 
 
-def _episode(config: SweepConfig, cell: Cell, episode: int, environment: Environment, remember: bool) -> Row:
+class _Memory(NamedTuple):
+    """Whether plans are remembered, and where they are shared."""
+
+    remember: bool
+    shared: Path | None
+
+
+def _episode(config: SweepConfig, cell: Cell, episode: int, environment: Environment, memory: _Memory) -> Row:
     started = time.perf_counter()
     setting, task = _task(cell.scene, config.sentence)
-    planner = _planner(cell.planner, config.planning_seed(episode), remember)
+    planner = _planner(cell.planner, config.planning_seed(episode), memory)
     seed = config.episode_seed(episode)
     run = RunConfig(
         scene=cell.scene,
@@ -87,6 +108,6 @@ def _task(scene: str, sentence: str) -> tuple[Setting, Task]:
 
 
 @lru_cache(maxsize=32)
-def _planner(name: str, seed: int, remember: bool) -> FixedSeed:
+def _planner(name: str, seed: int, memory: _Memory) -> FixedSeed:
     """One planner for all episodes of a process with this seed, so that they share what it remembers."""
-    return FixedSeed(make_planner(name), seed, remember)
+    return FixedSeed(make_planner(name), seed, *memory)

@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from cognitive_arch.errors import SweepError, one_line
@@ -60,8 +61,13 @@ def run_sweep(
         raise SweepError(f"{jobs} jobs; valid: 1 to 1024")
     if dask is not None and jobs != 1:
         raise SweepError("--jobs is for this machine, --dask for a cluster, which has its workers; give one")
-    work = partial(run_job, config, remember=remember)
-    with _cluster(dask) as client, open_rows(folder, config, command) as rows:
+    with (
+        _cluster(dask) as client,
+        TemporaryDirectory(prefix="cogarch-plans-") as plans,
+        open_rows(folder, config, command) as rows,
+    ):
+        shared = Path(plans) if jobs > 1 and remember else None  # a cluster has no folder in common
+        work = partial(run_job, config, remember=remember, shared=shared)
         before, total = rows.done, config.total
         on_rows(before, total)
         if before < total:
