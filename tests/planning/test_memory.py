@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -43,3 +45,16 @@ def test_what_differs_is_planned_for_anew(start: State, ground: tuple[GroundRule
     assert planner.planned == 5
     planner.plan(frozenset(start), GOAL, tuple(ground), 3, rng)
     assert planner.planned == 5
+
+
+def test_plans_are_shared_through_a_folder(
+    start: State, ground: tuple[GroundRule, ...], tmp_path: Path
+) -> None:
+    one, other = (FixedSeed(make_planner("a-prada"), 3, shared=tmp_path) for _ in range(2))
+    rng = np.random.default_rng(0)
+    for goal in (GOAL, literals("inHand(Cheese,LeftHand)")):  # the second has no plan
+        assert one.plan(start, goal, ground, 4, rng) == other.plan(start, goal, ground, 4, rng)
+    assert (one.planned, other.planned) == (2, 0)
+    stranger = FixedSeed(make_planner("a-prada"), 4, shared=tmp_path)
+    stranger.plan(start, GOAL, ground, 4, rng)
+    assert stranger.planned == 1
