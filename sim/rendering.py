@@ -59,8 +59,8 @@ def check_rendering() -> None:
         ctypes.CDLL("libEGL.so.1")
     except OSError:
         raise BackendError(
-            "pictures need the system library libEGL; install it "
-            "(Debian, Ubuntu: sudo apt-get install libegl1) or run with --no-record"
+            "eyes and pictures need the system library libEGL; install it "
+            "(Debian, Ubuntu: sudo apt-get install libegl1) or run with --perception oracle --no-record"
         ) from None
 
 
