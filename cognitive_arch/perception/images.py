@@ -2,11 +2,14 @@
 
 Whatever the file holds (grey, 16 bit, a palette, transparency), an image here is (height, width, 3) uint8
 RGB. How large a picture is, is read from its header, so that a huge one is refused before it is decoded.
+Only the formats below are ever tried, so that no file makes Pillow start another program.
 """
 
 from __future__ import annotations
 
 import os
+import stat
+import warnings
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -23,6 +26,10 @@ MAX_PIXELS = 50_000_000
 JPEG_NOISE = 12  # grey levels that compression leaves in what was black
 IMAGE_SUFFIXES = (".bmp", ".gif", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp")
 VIDEO_SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
+FORMATS = ("BMP", "GIF", "JPEG", "PNG", "PPM", "TIFF", "WEBP")  # Pillow's names for IMAGE_SUFFIXES
+
+# FFmpeg asks for this once in a process, when it is first used; what it has to say is said by our errors.
+os.environ.setdefault("OPENCV_FFMPEG_LOGLEVEL", "-8")
 
 
 def frames(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
@@ -32,7 +39,7 @@ def frames(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
     An image of a folder that cannot be read comes as its error, so that one broken file does not hide the
     others. Raises `PerceptionError` for anything else that cannot be read.
     """
-    if path.is_dir():
+    if os.path.isdir(path):  # unlike Path's, this raises for no name
         yield from _folder(path)
     elif path.suffix.lower() in VIDEO_SUFFIXES:
         yield from _video(path)
@@ -42,7 +49,7 @@ def frames(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
 
 def is_many(path: Path) -> bool:
     """Whether `path` is a folder or, by its name, a video."""
-    return path.is_dir() or path.suffix.lower() in VIDEO_SUFFIXES
+    return os.path.isdir(path) or path.suffix.lower() in VIDEO_SUFFIXES
 
 
 def read_image(path: Path) -> Image:
@@ -50,21 +57,23 @@ def read_image(path: Path) -> Image:
 
     Raises `PerceptionError` for what is no image, is cut off, or has more than `MAX_PIXELS`.
     """
+    _check_file(path, "image", IMAGE_SUFFIXES)
     try:
-        with _opened(path) as picture:
-            width, height = picture.size
-            _check_size(path, width, height)
-            return _rgb(path, ImageOps.exif_transpose(picture))
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Pillow's, of odd metadata
+            with _opened(path) as picture:
+                width, height = picture.size
+                _check_size(path, width, height)
+                return _rgb(path, ImageOps.exif_transpose(picture))
+    except PerceptionError:
+        raise
     except UnidentifiedImageError:
         empty = "is empty" if path.stat().st_size == 0 else "is no image"
-        raise PerceptionError(
-            f"'{one_line(path)}' {empty}; valid: {', '.join(s[1:] for s in IMAGE_SUFFIXES)}"
-        ) from None
+        raise PerceptionError(f"{_quoted(path)} {empty}; valid: {_listed(IMAGE_SUFFIXES)}") from None
     except MemoryError:
-        raise PerceptionError(f"'{one_line(path)}' does not fit into memory") from None
-    except (OSError, SyntaxError, ValueError, EOFError) as error:  # what decoders raise for broken files
-        said = error.strerror if isinstance(error, OSError) and error.strerror else error
-        raise PerceptionError(f"cannot read the image '{one_line(path)}': {one_line(said)}") from None
+        raise PerceptionError(f"{_quoted(path)} does not fit into memory") from None
+    except Exception as error:  # Pillow's decoders raise nearly anything for broken files
+        raise PerceptionError(f"cannot read the image {_quoted(path)}: {_reason(error)}") from None
 
 
 def read_mask(path: Path, size: tuple[int, int]) -> NDArray[np.bool_]:
@@ -77,7 +86,7 @@ def read_mask(path: Path, size: tuple[int, int]) -> NDArray[np.bool_]:
     mask: NDArray[np.bool_] = read_image(path).max(axis=2) > black
     if mask.shape != size[::-1]:
         raise PerceptionError(
-            f"the mask '{one_line(path)}' is {mask.shape[1]}x{mask.shape[0]} pixels; "
+            f"the mask {_quoted(path)} is {mask.shape[1]}x{mask.shape[0]} pixels; "
             f"valid for this image: {size[0]}x{size[1]}"
         )
     return mask
@@ -88,21 +97,30 @@ def _opened(path: Path) -> Pictures.Image:
     message does not tell the size; ours comes next."""
     limit, Pictures.MAX_IMAGE_PIXELS = Pictures.MAX_IMAGE_PIXELS, None
     try:
-        return Pictures.open(path)
+        return Pictures.open(path, formats=FORMATS)
     finally:
         Pictures.MAX_IMAGE_PIXELS = limit
+
+
+def _check_file(path: Path, what: str, suffixes: tuple[str, ...]) -> None:
+    try:
+        mode = path.stat().st_mode
+    except (OSError, ValueError) as error:
+        raise PerceptionError(f"cannot read the {what} {_quoted(path)}: {_reason(error)}") from None
+    if not stat.S_ISREG(mode):  # a pipe would be waited for, a device read without end
+        raise PerceptionError(f"{_quoted(path)} is no regular file; valid: {_listed(suffixes)}")
 
 
 def _check_size(path: Path, width: int, height: int) -> None:
     if width * height > MAX_PIXELS:
         raise PerceptionError(
-            f"'{one_line(path)}' is {width}x{height} pixels; valid: at most {MAX_PIXELS // 10**6} million"
+            f"{_quoted(path)} is {width}x{height} pixels; valid: at most {MAX_PIXELS // 10**6} million"
         )
 
 
 def _rgb(path: Path, picture: Pictures.Image) -> Image:
     if picture.mode == "F":
-        raise PerceptionError(f"'{one_line(path)}' has floating point pixels; valid: whole numbers")
+        raise PerceptionError(f"{_quoted(path)} has floating point pixels; valid: whole numbers")
     if picture.mode.startswith("I"):  # 16 bits of grey
         grey = np.clip(np.asarray(picture).astype(np.int64) >> 8, 0, 255).astype(np.uint8)
         return np.ascontiguousarray(np.broadcast_to(grey[:, :, None], (*grey.shape, 3)))
@@ -116,11 +134,10 @@ def _folder(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
     try:
         names = sorted(name for name in os.listdir(path) if name.lower().endswith(IMAGE_SUFFIXES))
     except OSError as error:
-        raise PerceptionError(f"cannot read the folder '{one_line(path)}': {error.strerror}") from None
+        raise PerceptionError(f"cannot read the folder {_quoted(path)}: {_reason(error)}") from None
+    names = [name for name in names if not os.path.isdir(path / name)]
     if not names:
-        raise PerceptionError(
-            f"no image in the folder '{one_line(path)}'; valid: {', '.join(s[1:] for s in IMAGE_SUFFIXES)}"
-        )
+        raise PerceptionError(f"no image in the folder {_quoted(path)}; valid: {_listed(IMAGE_SUFFIXES)}")
     for name in names:
         try:
             yield name, read_image(path / name)
@@ -131,14 +148,21 @@ def _folder(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
 def _video(path: Path) -> Iterator[tuple[str, Image]]:
     import cv2
 
-    if not path.is_file():
-        raise PerceptionError(f"there is no video '{one_line(path)}'")
-    reader = cv2.VideoCapture(str(path))
+    _check_file(path, "video", VIDEO_SUFFIXES)
+    name = str(path.resolve())  # in full, as FFmpeg takes some names for addresses
+    try:
+        name.encode()  # or OpenCV crashes
+    except UnicodeError:
+        raise PerceptionError(f"the name of the video {_quoted(path)} is not UTF-8; rename it") from None
+    level = cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+    try:
+        reader = cv2.VideoCapture(name, cv2.CAP_FFMPEG)  # others take '%' for a series of images
+    finally:
+        cv2.utils.logging.setLogLevel(level)
     try:
         if not reader.isOpened():
             raise PerceptionError(
-                f"'{one_line(path)}' is no video that can be read; valid: "
-                f"{', '.join(s[1:] for s in VIDEO_SUFFIXES)}"
+                f"{_quoted(path)} is no video that can be read; valid: {_listed(VIDEO_SUFFIXES)}"
             )
         _check_size(
             path, int(reader.get(cv2.CAP_PROP_FRAME_WIDTH)), int(reader.get(cv2.CAP_PROP_FRAME_HEIGHT))
@@ -148,6 +172,23 @@ def _video(path: Path) -> Iterator[tuple[str, Image]]:
             yield f"{path.name}-{count:05d}", np.asarray(cv2.cvtColor(answer[1], cv2.COLOR_BGR2RGB), np.uint8)
             count += 1
         if count == 0:
-            raise PerceptionError(f"the video '{one_line(path)}' has no frame that can be read")
+            raise PerceptionError(f"the video {_quoted(path)} has no frame that can be read")
+    except cv2.error as error:
+        raise PerceptionError(f"cannot read the video {_quoted(path)}: {_reason(error)}") from None
     finally:
         reader.release()
+
+
+def _quoted(path: Path) -> str:
+    """`path` on one line; of a long one its end, for the file's name is there."""
+    flat = one_line(path, 100_000)
+    return f"'{flat}'" if len(flat) <= 160 else f"'...{flat[-157:]}'"
+
+
+def _reason(error: Exception) -> str:
+    strerror = error.strerror if isinstance(error, OSError) else None
+    return one_line(strerror or error) or type(error).__name__
+
+
+def _listed(suffixes: tuple[str, ...]) -> str:
+    return ", ".join(suffix[1:] for suffix in suffixes)
