@@ -44,6 +44,7 @@ bench: setup
 	$(PY) -m benchmarks.planner
 	$(PY) -m benchmarks.perception --quick
 	$(PY) -m benchmarks.sweep
+	$(PY) -m benchmarks.affordances
 
 clean:
 	rm -rf $(VENV) build dist .pytest_cache .mypy_cache .ruff_cache

@@ -65,9 +65,14 @@ class SklearnModel:
         """See `EffectModel`."""
         with_start = table.has_start
         inputs = _inputs(table, with_start)
-        fitted = [
-            cls._classifier(int(rng.integers(2**31))).fit(inputs, table.bins[:, axis]) for axis in range(2)
-        ]
+        fitted = []
+        for axis in range(2):
+            classifier = cls._classifier(int(rng.integers(2**31)))
+            if len(np.unique(table.bins[:, axis])) == 1:
+                from sklearn.dummy import DummyClassifier
+
+                classifier = DummyClassifier()  # logistic regression refuses a single class
+            fitted.append(classifier.fit(inputs, table.bins[:, axis]))
         return cls(fitted, with_start, table)
 
     @classmethod

@@ -65,6 +65,16 @@ def test_models_learn_from_single_trials(trials: TrialTable, name: str) -> None:
     assert model.joint(surprise)[0, 0, 4] > before
 
 
+@pytest.mark.parametrize("name", MODELS)
+def test_a_handful_of_trials_is_enough_to_start(trials: TrialTable, name: str) -> None:
+    """One axis without any movement, one action never tried, three trials."""
+    few = trials.take(np.flatnonzero(trials.action == action_index("push"))[:3])
+    effect = np.array([[-0.1, 0.0], [0.0, 0.0], [-0.1, 0.0]])
+    model = MODELS[name].fit(replace(few, effect=effect), RNG(0))
+    joint = model.joint(trials.take(np.arange(8)))
+    np.testing.assert_allclose(joint.sum(axis=(1, 2)), 1.0, atol=1e-6)
+
+
 def test_the_same_seed_learns_the_same(trials: TrialTable) -> None:
     first, second = (MODELS["default"].fit(trials, RNG(3)).joint(trials) for _ in range(2))
     np.testing.assert_array_equal(first, second)
