@@ -39,18 +39,7 @@ def search(start, pos, neg, add, rem, goal_pos, goal_neg, prices, o, goal, limit
             continue  # a cheaper way to this world was found meanwhile
         here = world[node].copy()
         if _holds(here, goal_pos, goal_neg):
-            length = 0
-            k = node
-            while parent[k] >= 0:
-                length += 1
-                k = parent[k]
-            path = np.empty(length, np.int64)
-            k = node
-            while parent[k] >= 0:
-                length -= 1
-                path[length] = via[k]
-                k = parent[k]
-            return path, FOUND
+            return _path(parent, via, node), FOUND
         done += 1
         if done > most:
             return np.empty(0, np.int64), EXHAUSTED
@@ -80,6 +69,22 @@ def search(start, pos, neg, add, rem, goal_pos, goal_neg, prices, o, goal, limit
             if h[found] < NEVER and cost + h[found] <= limit:
                 _push(heap, (cost + h[found], h[found], found))
     return np.empty(0, np.int64), NOTHING
+
+
+@numba.njit(cache=True, nogil=True)
+def _path(parent, via, node):  # type: ignore[no-untyped-def]
+    """The rules that led to world number `node`, in order."""
+    length = 0
+    k = node
+    while parent[k] >= 0:
+        length += 1
+        k = parent[k]
+    path = np.empty(length, np.int64)
+    while parent[node] >= 0:
+        length -= 1
+        path[length] = via[node]
+        node = parent[node]
+    return path
 
 
 @numba.njit(cache=True, nogil=True)
@@ -180,19 +185,7 @@ def landmark_cut(o, goal, world, scratch):  # type: ignore[no-untyped-def]
             return NEVER
         if value[dearest] <= 1e-9:
             return total
-        # The zone: literals from which the goal follows at no cost, along supporters.
-        zone[:] = False
-        zone[dearest] = True
-        changed = True
-        while changed:
-            changed = False
-            for op in range(len(left)):
-                if left[op] <= 1e-9 and supporter[op] >= 0 and not zone[supporter[op]] and missing[op] == 0:
-                    for k in range(o.add_ptr[op], o.add_ptr[op + 1]):
-                        if zone[o.add[k]]:
-                            zone[supporter[op]] = True
-                            changed = True
-                            break
+        _mark_zone(o, dearest, left, missing, supporter, zone)
         # What can be reached without crossing into it; the operators that cross are the cut.
         reached[:] = False
         for literal in range(len(value)):
@@ -228,6 +221,23 @@ def landmark_cut(o, goal, world, scratch):  # type: ignore[no-untyped-def]
                             left[op] -= least
                         break
         total += least
+
+
+@numba.njit(cache=True, nogil=True)
+def _mark_zone(o, dearest, left, missing, supporter, zone):  # type: ignore[no-untyped-def]
+    """Mark in `zone` the literals from which `dearest` follows at no cost, along supporters."""
+    zone[:] = False
+    zone[dearest] = True
+    changed = True
+    while changed:
+        changed = False
+        for op in range(len(left)):
+            if left[op] <= 1e-9 and supporter[op] >= 0 and not zone[supporter[op]] and missing[op] == 0:
+                for k in range(o.add_ptr[op], o.add_ptr[op + 1]):
+                    if zone[o.add[k]]:
+                        zone[supporter[op]] = True
+                        changed = True
+                        break
 
 
 @numba.njit(cache=True, nogil=True)
