@@ -18,7 +18,17 @@ from cognitive_arch.world.anchoring import WorldModel
 from tests.conftest import action, literals
 
 ROOT = Path(__file__).resolve().parents[1]
-FOUNDATION = {"errors", "resources", "shapes", "footprint", "domain", "random_scenes", "scenes", "outside"}
+FOUNDATION = {
+    "errors",
+    "resources",
+    "shapes",
+    "footprint",
+    "domain",
+    "random_scenes",
+    "scenes",
+    "outside",
+    "kernel_cache",
+}
 # Each package may import those named here, the foundation, and itself.
 ALLOWED = {
     "relational": set(),

@@ -21,10 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cognitive_arch.errors import PerceptionError, unknown
-from cognitive_arch.perception.outline import Mask, Outline, cropped, halves, outline, ratio
+from cognitive_arch.perception.outline import MOMENTS, Mask, Outline, cropped, halves, outline, ratio
 
 AREA_UNIT = 3000.0  # square pixels; the constant behind the published areas
-DEFECT_DEPTH = 8.0  # pixels; bays that are less deep are not counted
 PARTS = ("whole", "top", "bottom")
 SHAPE, BLOB = "shapeDescriptor", "blobDescriptor"
 DEFAULT = SHAPE
@@ -79,11 +78,11 @@ def squareness(blob: Outline) -> float:
 
 
 def convexity_defects(blob: Outline) -> float:
-    """Number of bays in the outline that are deeper than `DEFECT_DEPTH` pixels.
+    """Number of bays in the outline that are deeper than `outline.DEEP` pixels.
 
     Keeps under translation and rotation; not under a change of scale, as the depth is in pixels.
     """
-    return float(np.count_nonzero(blob.defect_depths > DEFECT_DEPTH))
+    return blob.bays
 
 
 def normalised_moment(name: str) -> Callable[[Outline], float]:
@@ -93,8 +92,10 @@ def normalised_moment(name: str) -> Callable[[Outline], float]:
     upright and so keep under rotation.
     """
 
+    place = MOMENTS.index(name)
+
     def moment(blob: Outline) -> float:
-        return float(blob.moments[name])
+        return blob.moments[place]
 
     moment.__name__ = name
     return moment
@@ -127,10 +128,7 @@ _MOVED = frozenset({"translation"})
 _TURNED = _MOVED | {"rotation"}
 _SCALED = _MOVED | {"scale"}
 _ALL = _TURNED | _SCALED
-_MOMENTS = tuple(
-    Descriptor(name, normalised_moment(name), _SCALED)
-    for name in ("nu20", "nu11", "nu02", "nu30", "nu21", "nu12", "nu03")
-)
+_MOMENTS = tuple(Descriptor(name, normalised_moment(name), _SCALED) for name in MOMENTS)
 FORMULAS: Mapping[str, Formulas] = {
     SHAPE: Formulas(
         (

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cognitive_arch.planning import kernel_cache, kernels
+from cognitive_arch import kernel_cache
+from cognitive_arch.planning import kernels
 from cognitive_arch.planning.base import PlanResult
 from cognitive_arch.planning.compilation import warm_up
 from cognitive_arch.planning.prada import APrada, Prada
@@ -181,16 +182,15 @@ def test_kernels_of_other_sources_lie_elsewhere(tmp_path: Path, monkeypatch: pyt
     package = tmp_path / "planning"
     package.mkdir()
     (package / "kernels.py").write_text("a = 1")
-    monkeypatch.setattr(kernel_cache, "__file__", str(package / "kernel_cache.py"))
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(tmp_path / "cache"))
-    first = kernel_cache.kernel_folder()
-    assert first == kernel_cache.kernel_folder()
+    first = kernel_cache.kernel_folder(package)
+    assert first == kernel_cache.kernel_folder(package)
     assert first.parent == tmp_path / "cache"
     (package / "kernels.py").write_text("a = 2")
-    second = kernel_cache.kernel_folder()
+    second = kernel_cache.kernel_folder(package)
     assert second != first
     os.utime(first, (1, 1))
-    assert kernel_cache.kernel_folder() == second
+    assert kernel_cache.kernel_folder(package) == second
     assert not first.exists()
 
 
@@ -201,7 +201,7 @@ def test_kernels_find_a_place_where_nothing_can_be_written(
     nowhere.write_text("not a folder")
     monkeypatch.setenv("NUMBA_CACHE_DIR", str(nowhere))
     monkeypatch.setenv("XDG_CACHE_HOME", str(nowhere))
-    folder = kernel_cache.kernel_folder()
+    folder = kernel_cache.kernel_folder(tmp_path)
     assert folder.is_dir()
     folder.rmdir()
 

@@ -11,15 +11,33 @@ import os
 import shutil
 import tempfile
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 KEEP_DAYS = 14
 """Folders of other versions are deleted when they have not been used for so long."""
 
 
-def kernel_folder() -> Path:
-    """A folder for the kernels of these very sources, made if need be; a temporary one as a last resort."""
-    sources = sorted(Path(__file__).parent.glob("*.py"))
+@contextmanager
+def kernels_kept(package: Path) -> Iterator[None]:
+    """Modules with kernels that are imported in here, those of `package`, have them kept in their folder.
+
+    numba reads the setting when it meets a kernel; those of other packages keep their own places.
+    """
+    import numba
+
+    elsewhere, numba.config.CACHE_DIR = numba.config.CACHE_DIR, str(kernel_folder(package))
+    try:
+        yield
+    finally:
+        numba.config.CACHE_DIR = elsewhere
+
+
+def kernel_folder(package: Path) -> Path:
+    """A folder for the kernels of the sources in the folder `package` as they are now, made if need be; a
+    temporary one as a last resort."""
+    sources = sorted(package.glob("*.py"))
     digest = hashlib.sha256(b"\0".join(source.read_bytes() for source in sources)).hexdigest()[:16]
     for root in _roots():
         folder = root / f"kernels-{digest}"
