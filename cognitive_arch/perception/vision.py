@@ -28,7 +28,7 @@ class Recogniser(Protocol):
 
     def classify(self, image: Image, mask: NDArray[np.bool_]) -> list[tuple[str, float]]:
         """Names with their probabilities, the likeliest first, for the region `mask` (height, width) of
-        `image` (height, width, 3) RGB; one of the names is "unknown"."""
+        `image` (height, width, 3) RGB, both of which may be cut to its box; one of the names is "unknown"."""
         ...
 
 
@@ -88,9 +88,7 @@ def _name(image: Image, blob: Blob, recogniser: Recogniser | None) -> tuple[str 
     if recogniser is None:
         return None, None
     x, y, width, height = blob.bbox
-    whole = np.zeros(image.shape[:2], np.bool_)
-    whole[y : y + height, x : x + width] = blob.mask.view(np.bool_)
-    return recogniser.classify(image, whole)[0]
+    return recogniser.classify(image[y : y + height, x : x + width], blob.mask.view(np.bool_))[0]
 
 
 def annotated(image: Image, seen: Sequence[SeenBlob]) -> Image:
