@@ -9,13 +9,18 @@ is all that tells grey from black or white.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from pathlib import Path
 
 import cv2
 import numpy as np
-from cv2.typing import MatLike
 from numpy.typing import NDArray
 
 from cognitive_arch.errors import PerceptionError
+from cognitive_arch.kernel_cache import kernels_kept
+
+with kernels_kept(Path(__file__).parent):
+    from cognitive_arch.perception import region_kernels as kernels
 
 Image = NDArray[np.uint8]
 Mask = NDArray[np.bool_]
@@ -64,45 +69,33 @@ def appearance(image: Image, mask: Mask) -> NDArray[np.float32]:
     region[1:-1, 1:-1] = whole[top : top + height, left : left + width]
     colors = np.zeros((height + 2, width + 2, 3), np.uint8)
     colors[1:-1, 1:-1] = image[top : top + height, left : left + width]
-    tones = cv2.transform(colors, np.full((1, 3), 1 / 3))
-    shades = _percentiles(tones, region)
-    lit = cv2.bitwise_and(cv2.inRange(tones, LIT * shades[-1], 255), region)
-    places, lit_places = _places(region), _places(lit)
-    numbers = [math.log((shades[-1] + 1) / 256), *_colors(colors, tones, region, lit, lit_places)]
+    tones, lit = np.empty_like(region), np.empty_like(region)
+    counts = np.empty(256, np.int64)
+    kernels.shade(colors, region, tones, counts)
+    shades = _percentiles(counts)
+    found, varies = np.empty((2, kernels.FORM + kernels.FORMS)), np.empty(4)
+    least = round(LIT * shades[-1])
+    kernels.look(colors, tones, region, least, DARK, (SAMPLE, OUTLINE_SAMPLE), lit, found, varies)
+    of_all, of_lit = found.tolist()
+    numbers = [math.log((shades[-1] + 1) / 256), *_colors(of_all, of_lit, varies.tolist())]
     numbers += [(shade + 1) / (shades[-1] + 1) for shade in shades[:-1]]
-    of_whole, middle, area = _shape(region, places)
-    of_lit, lit_middle, _ = _shape(lit, lit_places)
-    size = math.sqrt(area)
-    numbers += [*of_whole, *of_lit]
-    numbers += [(lit_middle[0] - middle[0]) / size, (lit_middle[1] - middle[1]) / size]
+    numbers += [*_shape(region, of_all), *_shape(lit, of_lit)]
+    size = math.sqrt(of_all[kernels.COUNT])
+    numbers += [(of_lit[axis] - of_all[axis]) / size for axis in (kernels.X, kernels.Y)]
     return np.array(numbers, dtype=np.float32)
 
 
-def _percentiles(tones: MatLike, region: MatLike) -> list[float]:
-    """The shades that `SHADES` and `BRIGHTEST` of the region's pixels stay below."""
-    counts = cv2.calcHist([tones], [0], region, [256], [0, 256]).ravel()
-    below = np.cumsum(counts)
+def _percentiles(counts: NDArray[np.int64]) -> list[float]:
+    """The shades that `SHADES` and `BRIGHTEST` of the pixels stay below; (256,) `counts` of them."""
+    below = counts.cumsum()
     wanted = np.array([*SHADES, BRIGHTEST]) * below[-1]
-    return [float(shade) for shade in np.searchsorted(below, wanted)]
+    places: list[float] = below.searchsorted(wanted).tolist()
+    return places
 
 
-def _places(region: MatLike) -> NDArray[np.int32]:
-    """x and y (2, n) of its pixels, row by row."""
-    return np.asarray(cv2.findNonZero(region), np.int32).reshape(-1, 2).T
-
-
-def _colors(
-    colors: Image, tones: MatLike, region: MatLike, lit: MatLike, lit_places: NDArray[np.int32]
-) -> list[float]:
-    red, green, blue = (value + DARK for value in cv2.mean(colors, lit)[:3])
-    all_red, all_green, all_blue = (value + DARK for value in cv2.mean(colors, region)[:3])
-    count = lit_places.shape[1]
-    x, y = lit_places[:, :: count // SAMPLE + 1]
-    chosen = colors[y, x].T + DARK
-    shares = chosen[:2] / (chosen[0] + chosen[1] + chosen[2])
-    shares -= shares.mean(axis=1, keepdims=True)
-    spread = np.sqrt(np.square(shares).mean(axis=1))
-    mean, deviation = cv2.meanStdDev(tones, mask=lit)
+def _colors(of_all: Sequence[float], of_lit: Sequence[float], varies: Sequence[float]) -> list[float]:
+    red, green, blue = (of_lit[n] + DARK for n in (kernels.RED, kernels.GREEN, kernels.BLUE))
+    all_red, all_green, all_blue = (of_all[n] + DARK for n in (kernels.RED, kernels.GREEN, kernels.BLUE))
     total, all_total = red + green + blue, all_red + all_green + all_blue
     return [
         red / total,
@@ -111,25 +104,21 @@ def _colors(
         math.log(green / blue),
         all_red / all_total,
         all_green / all_total,
-        float(spread[0]),
-        float(spread[1]),
-        count / cv2.countNonZero(region),
-        float(deviation[0, 0] / (mean[0, 0] + 1)),
+        varies[kernels.RED_VARIES],
+        varies[kernels.GREEN_VARIES],
+        of_lit[kernels.COUNT] / of_all[kernels.COUNT],
+        varies[kernels.TONE_VARIES] / (varies[kernels.TONE] + 1),
     ]
 
 
-def _shape(region: MatLike, places: NDArray[np.int32]) -> tuple[list[float], tuple[float, float], float]:
-    """Numbers for `_SHAPE`, the middle (x, y) in pixels, and the area in pixels.
+def _shape(region: NDArray[np.uint8], found: Sequence[float]) -> list[float]:
+    """Numbers for `_SHAPE` of a region in which `kernels.look` found these.
 
     In this order: the shorter by the longer half axis; the area by that of the ellipse with the same
     moments; by that of the convex hull; by that of the smallest rectangle around it; its shorter by its
-    longer side; 4 pi area / perimeter^2; then those of `_form`.
+    longer side; 4 pi area / perimeter^2; then those of the form.
     """
-    moments = cv2.moments(region, binaryImage=True)
-    area = moments["m00"]
-    middle = (moments["m10"] / area, moments["m01"] / area)
-    # A pixel is a square, not a point: a twelfth each way.
-    xx, yy, xy = moments["mu20"] / area + 1 / 12, moments["mu02"] / area + 1 / 12, moments["mu11"] / area
+    area, xx, yy, xy = (found[n] for n in (kernels.COUNT, kernels.XX, kernels.YY, kernels.XY))
     spread = math.sqrt((xx - yy) ** 2 / 4 + xy * xy)
     longer, shorter = (xx + yy) / 2 + spread, max((xx + yy) / 2 - spread, 1 / 12)
     outlines, _ = cv2.findContours(region, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
@@ -140,39 +129,12 @@ def _shape(region: MatLike, places: NDArray[np.int32]) -> tuple[list[float], tup
     hull_area = cv2.contourArea(hull) + cv2.arcLength(hull, True) / 2 + 1
     _, sides, _ = cv2.minAreaRect(hull)
     long, short = max(sides) + 1, min(sides) + 1
-    numbers = [
+    return [
         math.sqrt(shorter / longer),
         area / (4 * math.pi * math.sqrt(longer * shorter)),
         area / hull_area,
         area / (long * short),
         short / long,
         4 * math.pi * area / perimeter**2,
-        *_form(places, middle, (xx, yy, xy)),
+        *found[kernels.FORM :],
     ]
-    return numbers, middle, area
-
-
-def _form(
-    places: NDArray[np.int32], middle: tuple[float, float], second: tuple[float, float, float]
-) -> tuple[float, ...]:
-    """Moments of third and fourth order after stretching the region until it is as wide as it is high.
-
-    A slanted view of something flat is such a stretching, about: a disc has the moments of a disc from
-    wherever one looks at it. None depends on how the stretched region is turned.
-    """
-    sample = places[:, :: places.shape[1] // OUTLINE_SAMPLE + 1]
-    x, y = sample[0] - middle[0], sample[1] - middle[1]
-    xx, yy, xy = second
-    u = x / math.sqrt(xx)
-    v = (y - xy / xx * x) / math.sqrt(max(yy - xy * xy / xx, 1 / 12))
-    z = u + 1j * v
-    square = z * z
-    radius = u * u + v * v
-    n = len(z)
-    return (
-        float(radius @ radius) / n / 4,
-        float(abs(radius @ z)) / n,
-        float(abs(square @ z)) / n,
-        float(abs(square @ square)) / n,
-        float(abs(square @ radius)) / n,
-    )

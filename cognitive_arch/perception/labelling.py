@@ -19,16 +19,21 @@ _CHILD, _PARENT = 2, 3  # columns of OpenCV's tree of outlines
 class Blob:
     """One connected piece of a mask.
 
-    `bbox` is (x, y, width, height), `centroid` (x, y), `area` the number of its pixels, all in pixels;
+    `bbox` is (x, y, width, height), `area` the number of its pixels, all in pixels;
     `mask` (height, width) uint8 is 1 where it is, within its box; `contour` (n, 2) int32, x and y in the
     whole image, its outer outline.
     """
 
     bbox: tuple[int, int, int, int]
-    centroid: tuple[float, float]
     area: int
     mask: NDArray[np.uint8]
     contour: NDArray[np.int32]
+
+    @cached_property
+    def centroid(self) -> tuple[float, float]:
+        """(x, y) in pixels."""
+        moments = cv2.moments(self.mask, binaryImage=True)
+        return self.bbox[0] + moments["m10"] / self.area, self.bbox[1] + moments["m01"] / self.area
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,11 +78,9 @@ def label_blobs(mask: NDArray[np.uint8] | NDArray[np.bool_], min_area: int = MIN
         cv2.drawContours(own, [contour], -1, 1, cv2.FILLED, offset=(-x, -y))
         if with_holes[number]:
             own = _piece(binary[y : y + height, x : x + width], own, contour[0, 0] - (x, y))
-        moments = cv2.moments(own, binaryImage=True)
-        area = int(moments["m00"])
+        area = cv2.countNonZero(own)
         if area >= min_area:
-            centroid = x + moments["m10"] / area, y + moments["m01"] / area
-            blobs.append(Blob((x, y, width, height), centroid, area, own, contour.reshape(-1, 2)))
+            blobs.append(Blob((x, y, width, height), area, own, contour.reshape(-1, 2)))
     return Labelling(shape, tuple(sorted(blobs, key=lambda blob: (blob.bbox[1], blob.bbox[0]))))
 
 

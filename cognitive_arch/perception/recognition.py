@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from cognitive_arch import resources
 from cognitive_arch.domain import Domain, load_domain
 from cognitive_arch.errors import PerceptionError, one_line
-from cognitive_arch.perception.appearance import COLORS, FEATURES, Image, Mask, appearance
+from cognitive_arch.perception.appearance import COLORS, FEATURES, Image, Mask, appearance, kernels
 
 UNKNOWN = "unknown"
 FILE = "recogniser.npz"
@@ -61,11 +61,9 @@ class Forest:
 
     def scores(self, features: Array) -> NDArray[np.float64]:
         """What the trees say to features (n_features,): (n_answers,)."""
-        node = self.roots
-        for _ in range(self.depth):
-            above = features.take(self.feature.take(node)) > self.threshold.take(node)
-            node = self.child.take(node) + above
-        scores: NDArray[np.float64] = self.start + self.value.take(node).sum(axis=0, dtype=np.float64)
+        scores = self.start.astype(np.float64)
+        nodes = (self.feature, self.threshold, self.child, self.value)
+        kernels.add_leaves(features, self.roots, *nodes, self.depth, scores)
         return scores
 
 
