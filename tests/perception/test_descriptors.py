@@ -23,7 +23,7 @@ from cognitive_arch.perception.descriptors import (
     Descriptions,
     describe,
 )
-from cognitive_arch.perception.outline import Outline
+from cognitive_arch.perception.outline import DEEP, MOMENTS, Outline
 
 Mask = NDArray[np.uint8]
 SECOND, THIRD = ("nu20", "nu11", "nu02"), ("nu30", "nu21", "nu12", "nu03")
@@ -244,6 +244,31 @@ def test_any_mask_gives_finite_numbers_in_their_range(rows: list[list[bool]], fo
     for part in (both.whole, both.top, both.bottom):
         for name in ("convexity", "eccentricity", "compactness", "circularity", "squareness"):
             assert 0 <= part[name] <= 1 + 1e-5, name
+
+
+@settings(max_examples=60, deadline=None)
+@given(blobs(), st.floats(0.3, 1))
+def test_outlines_have_the_measures_that_opencv_gives_them(
+    corners: NDArray[np.float64], narrow: float
+) -> None:
+    contours, _ = cv2.findContours(
+        filled(corners * (1.0, narrow), 70), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE
+    )
+    contour = np.asarray(max(contours, key=len), np.int32)
+    ours = Outline(contour)
+    assert ours.area == pytest.approx(cv2.contourArea(contour))
+    assert ours.perimeter == pytest.approx(cv2.arcLength(contour, True), rel=1e-5)
+    assert ours.hull_perimeter == pytest.approx(cv2.arcLength(cv2.convexHull(contour), True), rel=1e-5)
+    width, height = cv2.minAreaRect(contour)[1]
+    assert ours.rectangle_area == pytest.approx(width * height, rel=1e-4)
+    axes = cv2.fitEllipse(contour)[1]
+    assert ours.ellipse_ratio == pytest.approx(min(axes) / max(axes), abs=1e-4)
+    theirs = cv2.moments(contour)
+    assert ours.moments == pytest.approx([theirs[name] for name in MOMENTS], abs=1e-7)
+    defects = cv2.convexityDefects(contour, np.sort(cv2.convexHull(contour, returnPoints=False), axis=0))
+    assert ours.bays == (
+        0 if defects is None else np.count_nonzero(defects.reshape(-1, 4)[:, 3] > 256 * DEEP)
+    )
 
 
 # -- blobs with little to describe --------------------------------------------------------------------------
