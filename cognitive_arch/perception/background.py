@@ -3,10 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
+
+from cognitive_arch.kernel_cache import kernels_kept
+
+with kernels_kept(Path(__file__).parent):
+    from cognitive_arch.perception import background_kernels as kernels
 
 Image = NDArray[np.uint8]  # (height, width, 3), RGB
 Mask = NDArray[np.uint8]  # (height, width), 255 on things
@@ -58,19 +64,15 @@ def estimate_background(image: Image, ignore: NDArray[np.bool_] | None = None) -
         pixels = pixels[~ignore[::step, ::step].ravel().astype(np.bool_)]
     if not len(pixels):
         return None
-    samples = np.ascontiguousarray(pixels.T).astype(np.float32)  # one row per colour: three times as fast
-    shares = samples[:2] / (samples[0] + samples[1] + samples[2] + DARK)
-    red, green = (BINS * shares).astype(np.int32)
-    counts = np.bincount(red * BINS + green, minlength=BINS * BINS).astype(np.float32).reshape(BINS, BINS)
-    # Neighbouring bins count, too, as the colour may lie between two.
-    peak = int(np.asarray(cv2.blur(counts, (3, 3), borderType=cv2.BORDER_CONSTANT)).argmax())
-    near = (np.abs(red - peak // BINS) <= 1) & (np.abs(green - peak % BINS) <= 1)
-    table = samples.compress(near, axis=1) if near.any() else samples
-    colour = np.median(table, axis=1).astype(np.float64)
-    found = Background(colour, 0.0)
+    pixels, colour = np.ascontiguousarray(pixels), np.empty(3)
+    count, tones = len(pixels), np.zeros((3, 256), np.int64)
+    counts = np.zeros((BINS + 2, BINS + 2), np.int64)
+    kernels.commonest_colour(pixels, BINS, DARK, np.empty(count, np.int64), counts, tones, colour)
     # Over all of the picture: a table whose colour changes from place to place is noisy in this sense, too.
-    off = np.abs(found.matrix[:2, :3] @ samples)
-    return Background(colour, 1.4826 * float(np.median(off, axis=1).max()))
+    off = np.abs(Background(colour, 0.0).matrix[:2, :3] @ pixels.T.astype(np.float32))
+    off.partition(((count - 1) // 2, count // 2), axis=1)  # the median's middle two, with half its overhead
+    noise = (off[:, (count - 1) // 2] + off[:, count // 2]) / 2
+    return Background(colour, 1.4826 * float(noise.max()))
 
 
 def without_surroundings(mask: Mask, ignore: NDArray[np.bool_] | None = None) -> Mask:
@@ -86,6 +88,8 @@ def without_surroundings(mask: Mask, ignore: NDArray[np.bool_] | None = None) ->
         line = mask[place] if axis == 0 else mask[:, place]
         gap = None if ignore is None else (ignore[place] if axis == 0 else ignore[:, place])
         covered = line > 0 if gap is None else (line > 0) | gap.astype(np.bool_)
+        if np.count_nonzero(covered) <= SPAN * len(line):
+            continue
         ends = np.flatnonzero(np.diff(np.concatenate([[False], covered, [False]]).astype(np.int8)))
         for start, end in zip(ends[::2].tolist(), ends[1::2].tolist(), strict=True):
             if np.count_nonzero(line[start:end]) > SPAN * len(line):
@@ -111,7 +115,7 @@ def _is_reflection(contour: NDArray[np.int32], mask: Mask, image: Image, table: 
     rows, columns = slice(y, y + height), slice(x, x + width)
     own = mask[rows, columns]
     added = np.array(cv2.mean(image[rows, columns], own)[:3]) - table.colour
-    if added.min() <= 0 or np.abs(added - added.mean()).max() > WHITISH + 0.25 * added.mean():
+    if min(added.tolist()) <= 0 or np.abs(added - added.mean()).max() > WHITISH + 0.25 * added.mean():
         return False
     outline = contour[:: max(1, len(contour) // 48), 0].astype(np.float32)
     outwards = outline - np.array([x + (width - 1) / 2, y + (height - 1) / 2], np.float32)

@@ -93,7 +93,7 @@ def ratio(part: float, whole: float) -> float:
 
 
 def cropped(mask: Mask) -> NDArray[np.uint8]:
-    """The rectangle of `mask` (h, w) that holds all of its pixels that are not 0, as uint8, 0 or 1.
+    """The rectangle of `mask` (h, w) that holds all of its pixels that are not 0, as uint8.
 
     Raises `PerceptionError` for what is no mask, or an empty one.
     """
@@ -105,16 +105,16 @@ def cropped(mask: Mask) -> NDArray[np.uint8]:
     x, y, width, height = cv2.boundingRect(filled) if filled.size else (0, 0, 0, 0)
     if not width:
         raise PerceptionError("a mask without a pixel that is not 0; valid: one blob")
-    return cv2.threshold(filled[y : y + height, x : x + width], 0, 1, cv2.THRESH_BINARY)[1].astype(
-        np.uint8, copy=False
-    )
+    return np.ascontiguousarray(filled[y : y + height, x : x + width])
 
 
 def outline(blob: NDArray[np.uint8], up: tuple[float, float] = (0.0, -1.0)) -> Outline:
     """Of the largest piece of `blob` (h, w) uint8, which has a pixel that is not 0."""
     contours = cv2.findContours(blob, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]
+    if len(contours) == 1:
+        return Outline(np.asarray(contours[0], np.int32), up)
     pieces: list[Points] = [np.asarray(contour, np.int32) for contour in contours]
-    return Outline(pieces[0] if len(pieces) == 1 else max(pieces, key=_extent), up)
+    return Outline(max(pieces, key=_extent), up)
 
 
 def halves(blob: NDArray[np.uint8], whole: Outline) -> tuple[Outline, Outline]:

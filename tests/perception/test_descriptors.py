@@ -307,6 +307,14 @@ def test_of_equally_small_rectangles_the_longest_counts(quarter: int) -> None:
     assert abs(found.up[quarter % 2]) == pytest.approx(2 / math.sqrt(5))
 
 
+@pytest.mark.parametrize("start", range(4))
+def test_of_the_axes_of_a_square_the_more_upright_counts(start: int) -> None:
+    corners = np.roll(np.array([(0, 0), (40, 10), (30, 50), (-10, 40)]), start, axis=0)
+    found = Outline(corners.astype(np.int32)[:, None]).rectangle
+    assert found.up == pytest.approx(np.array([1, -4]) / math.sqrt(17))
+    assert (found.long, found.short) == pytest.approx((math.sqrt(1700),) * 2)
+
+
 def test_holes_count_as_filled() -> None:
     solid = np.ones((40, 60), np.uint8)
     pierced = solid.copy()
