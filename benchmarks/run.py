@@ -16,7 +16,8 @@ import numpy as np
 from cognitive_arch.execution.backends import make_environment
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.planning.registry import make_planner
-from cognitive_arch.session import RunConfig, Session, Setting, run_task
+from cognitive_arch.runs import run_task
+from cognitive_arch.session import RunConfig, Session, Setting
 from cognitive_arch.world.anchoring import WorldModel
 from sim.environment import DrakeEnvironment
 from sim.trials import HAND_PAIRS, attempt

@@ -136,7 +136,8 @@ def run(
     from cognitive_arch.execution.heuristics import Heuristics
     from cognitive_arch.execution.noise import NoiseLevels
     from cognitive_arch.outside import OutsideEvent
-    from cognitive_arch.session import RunConfig, resume_task, run_task
+    from cognitive_arch.runs import resume_task, run_task
+    from cognitive_arch.session import RunConfig
 
     if resume is not None:
         _check_alone(context, "--resume", {"resume", "store", "as_json"})
@@ -176,7 +177,7 @@ def _check_alone(context: typer.Context, option: str, allowed: set[str]) -> None
 def _carry_out(work: Callable[[Progress], dict[str, Any]], store: Path, as_json: bool) -> None:
     """Do a run, tell of it meanwhile, and print how it ended."""
     from cognitive_arch import report
-    from cognitive_arch.session import RunInterrupted
+    from cognitive_arch.runs import RunInterrupted
 
     try:
         with report.LiveProgress(quiet=as_json) as live:
@@ -205,7 +206,7 @@ def demo(
     """Run a named scenario: a tool for what is out of reach, sabotage, a slip, a thing that disappears."""
     from cognitive_arch import report
     from cognitive_arch.demos import load_demos
-    from cognitive_arch.session import run_task
+    from cognitive_arch.runs import run_task
 
     demos = load_demos()
     if name is None:

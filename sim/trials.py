@@ -19,8 +19,9 @@ from cognitive_arch.domain import Placement, Scene, load_domain
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.store import RunStore
+from cognitive_arch.runs import run_task
 from cognitive_arch.scenes import load_scene
-from cognitive_arch.session import RunConfig, run_task
+from cognitive_arch.session import RunConfig
 from sim.environment import DrakeEnvironment
 from sim.hands import Posture
 

@@ -13,7 +13,8 @@ from cognitive_arch.errors import ConfigError
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.runlog.store import RunStore
 from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
-from cognitive_arch.session import RunConfig, run_task
+from cognitive_arch.runs import run_task
+from cognitive_arch.session import RunConfig
 from tests.sim.physics import check_physics
 
 SEEDS = range(10)

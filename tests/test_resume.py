@@ -20,7 +20,8 @@ from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.runlog.store import RunStatus, RunStore
-from cognitive_arch.session import Progress, RunConfig, resume_task, run_task
+from cognitive_arch.runs import resume_task, run_task
+from cognitive_arch.session import Progress, RunConfig
 
 SANDWICH = "make a ham sandwich"
 

@@ -21,7 +21,7 @@ from cognitive_arch.evaluation.rows import Row, open_rows
 from cognitive_arch.evaluation.sweep import Job, SweepConfig
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.runlog.records import versions
-from cognitive_arch.session import prepare
+from cognitive_arch.runs import prepare
 
 PATIENCE_S = 5
 """How long a scheduler may take to answer."""

@@ -19,7 +19,8 @@ from cognitive_arch.runlog.store import RunStatus, RunStore
 LONG_RUN = """
 import sys
 from pathlib import Path
-from cognitive_arch.session import RunConfig, run_task, Progress
+from cognitive_arch.runs import run_task
+from cognitive_arch.session import RunConfig, Progress
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.heuristics import Heuristics
 def told(step):

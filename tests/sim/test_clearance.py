@@ -10,8 +10,9 @@ import pytest
 
 from cognitive_arch.domain import Domain, ObjectSpec, Placement, Scene, load_domain
 from cognitive_arch.execution.environment import FailureReason, Outcome
+from cognitive_arch.runs import run_task
 from cognitive_arch.scenes import load_scene
-from cognitive_arch.session import RunConfig, run_task
+from cognitive_arch.session import RunConfig
 from sim.environment import DrakeEnvironment
 from sim.kinematics import DOWN, HandTarget, fingertip, palm_axis
 from sim.skills.grasp import take

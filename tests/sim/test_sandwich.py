@@ -21,8 +21,9 @@ from cognitive_arch.errors import StoreError
 from cognitive_arch.execution.environment import FailureReason, Outcome
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.runlog.trajectory import Trajectory
+from cognitive_arch.runs import resume_task, run_task
 from cognitive_arch.scenes import load_scene
-from cognitive_arch.session import Progress, RunConfig, resume_task, run_task
+from cognitive_arch.session import Progress, RunConfig
 from sim.environment import DrakeEnvironment
 from sim.pictures import Stage, write_video
 from sim.trials import HAND_PAIRS, attempt, sandwich, stacked
@@ -114,7 +115,8 @@ DIGEST = """
 import hashlib, json, sys
 from pathlib import Path
 from cognitive_arch.runlog.trajectory import Trajectory
-from cognitive_arch.session import Progress, RunConfig, resume_task, run_task
+from cognitive_arch.runs import resume_task, run_task
+from cognitive_arch.session import Progress, RunConfig
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.runlog.store import RunStore
 folder = Path(sys.argv[1])
