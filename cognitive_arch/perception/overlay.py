@@ -39,7 +39,7 @@ def draw(
     for name, place in (remembered or {}).items():
         if np.isfinite(place).all():
             cv2.drawMarker(picture, _pixel(place), REMEMBERED, cv2.MARKER_TILTED_CROSS, 10, 1, cv2.LINE_AA)
-            label(picture, f"({name})", (place[0], place[1] - 8), REMEMBERED)
+            label(picture, f"({name})", (place[0], place[1] + 24), REMEMBERED)
     return picture
 
 
