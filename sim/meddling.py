@@ -59,7 +59,7 @@ def _above(robot: Robot, name: str) -> tuple[str, ...]:
         new = [other for other in robot.truth.covered_by(queue.pop(0)) if other not in found]
         found += new
         queue += new
-    return tuple(sorted(found, key=robot.top_of))
+    return tuple(sorted(found, key=lambda other: float(robot.truth.pose(other).translation()[2])))
 
 
 def _lay(robot: Robot, name: str, wanted: Place, above: float, ignoring: tuple[str, ...] = ()) -> None:

@@ -46,6 +46,9 @@ class Perception(ABC):
     def look(self) -> None:
         """Take in how things are now; costs nothing where no time has passed since the last look."""
 
+    def feel(self) -> None:  # noqa: B027 (nothing to note where all is known)
+        """Take in what the hands hold at this moment."""
+
     @abstractmethod
     def names(self) -> tuple[str, ...]:
         """The things believed to be there, seen or remembered, sorted."""

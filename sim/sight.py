@@ -7,6 +7,7 @@ hand tells that it touches something, but not what.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -71,14 +72,14 @@ class CameraPerception(Perception):
         self.image = image = self._eyes.look(self._world.positions())
         view = SceneView(image.color, image.depth, image.own, image.camera, self._table)
         self.sightings = sightings(view, self._classify, self._shapes)
-        for sighting in self.sightings:
-            if sighting.whole:
-                self._descriptors[sighting.label] = _described(sighting)
-        self._tracker.update(
+        found = self._tracker.update(
             [_detection(sighting) for sighting in self.sightings],
             self._senses(),
             lambda name, pose: _judge(image, self._shapes[name], pose),
         )
+        for name, index in found.items():
+            if self.sightings[index].whole:
+                self._descriptors[name] = _described(self.sightings[index])
 
     def _senses(self) -> dict[str, HandSense]:
         joints = self._world.joints()
@@ -92,6 +93,10 @@ class CameraPerception(Perception):
         measured = self._world.fingers(self._world.joints(), hand)
         wanted = self._world.fingers(self._world.set_point, hand)
         return bool((measured - wanted > PRESSED).all() and measured.sum() > THINNEST)
+
+    def feel(self) -> None:
+        """See `Perception.feel`."""
+        self._feel()
 
     def _feel(self) -> Tracker:
         if self._felt != self._world.time:
@@ -168,6 +173,8 @@ class CameraPerception(Perception):
             for name, (desc, tooldesc) in saved["descriptors"].items()
         }
         self._looked, self._felt = float(saved["looked"]), -1.0
+        if not math.isfinite(self._looked):
+            raise ValueError("the time of the last look is no number")
 
 
 def _detection(sighting: Sighting) -> Detection:

@@ -18,11 +18,12 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from cognitive_arch.shapes import Shape
+from cognitive_arch.world.observation import HANDS
 
 Pose = NDArray[np.float64]  # (4, 4), a thing or a hand in the root frame, m
-UNKNOWN = "unknown"
-FAR, FAR_COST = 0.15, 2.0  # m after which distance from where a thing was speaks no further against it
+FAR, FAR_COST = 0.15, 1.0  # m after which distance from where a thing was speaks no further against it
 NEW_COST = 0.5  # in log probability, for a thing that was not there before
+CONVINCING = 0.5  # probability from which on a glimpse tells what it shows
 LEAST = 1e-6  # probability
 SAME = 0.008  # m that a thing at rest may seem to move
 DRIFT = 0.002  # m of uncertainty that one look later adds
@@ -104,30 +105,43 @@ class Tracker:
         detections: Sequence[Detection],
         hands: Mapping[str, HandSense],
         place: Callable[[str, Pose], Place],
-    ) -> None:
-        """Fold one look in. `place` tells what is to be seen where a thing should be."""
+    ) -> dict[str, int]:
+        """Fold one look in. `place` tells what is to be seen where a thing should be.
+
+        Returns which detection (its index) each thing in view is taken to be.
+        """
         self.feel(hands)
-        found = self._associate([detection for detection in detections if not detection.glimpse])
-        for name, candidate in found.items():
-            self._see(name, candidate)
+        found = self._associate(detections)
+        for name, index in found.items():
+            self._see(name, detections[index].candidates[name])
         missing = [name for name in self.tracks if name not in found]
-        for name in missing:
-            self._miss(name, place)
-        glimpses = dict(d.best for d in detections if d.glimpse and d.candidates)
+        verdicts = {name: self._missed(name, found, place) for name in missing}
+        for name, verdict in verdicts.items():
+            if verdict is Place.EMPTY:
+                del self.tracks[name]
+                self.gone.add(name)
+            else:
+                self.tracks[name] = replace(self.tracks[name], visible=verdict is Place.TAKEN)
+        glimpses = [d for d in detections if d.glimpse and d.candidates and d.best[1] > CONVINCING]
         for name in sorted(self.tracks, key=self.bottom):
-            self._explain(name, glimpses, self.gone & set(missing))
+            self._explain(name, {d.best[0] for d in glimpses}, self.gone & set(missing))
+        for detection in glimpses:
+            name = detection.best[0]
+            if name not in self.tracks:
+                self.tracks[name] = Track(detection.candidates[name].pose, LOOSE / 2, visible=False)
         self.gone -= self.tracks.keys()
+        return found
 
     def feel(self, hands: Mapping[str, HandSense]) -> None:
-        """Fold proprioception in: what is held moves along, what is no longer gripped is somewhere below."""
+        """Fold proprioception in: what is held moves along, what is not any more is where it was last."""
         for name, track in self.tracks.items():
             if track.hand is None or track.in_hand is None:
                 continue
             hand = hands[track.hand]
-            moved = replace(track, pose=hand.pose @ track.in_hand, sigma=IN_HAND)
-            if not hand.gripping:
-                moved = replace(moved, hand=None, in_hand=None, sigma=LOOSE)
-            self.tracks[name] = moved
+            if hand.gripping:
+                self.tracks[name] = replace(track, pose=hand.pose @ track.in_hand, sigma=IN_HAND)
+            else:
+                self.tracks[name] = replace(track, hand=None, in_hand=None, sigma=LOOSE)
 
     def take_hold(self, hand: str, name: str, X_WH: Pose, X_WO: Pose) -> None:
         """The fingers of a hand at `X_WH` close around a thing at `X_WO`."""
@@ -168,22 +182,23 @@ class Tracker:
 
     # -- one look -----------------------------------------------------------------------------------------
 
-    def _associate(self, detections: Sequence[Detection]) -> dict[str, Candidate]:
+    def _associate(self, detections: Sequence[Detection]) -> dict[str, int]:
         """Which detection is which thing: the likeliest assignment of all of them together."""
-        names = sorted({name for detection in detections for name in detection.candidates})
+        told = [index for index, detection in enumerate(detections) if not detection.glimpse]
+        names = sorted({name for index in told for name in detections[index].candidates})
         if not names:
             return {}
         # One column per thing, then one per detection for its being none of them.
-        scores = np.full((len(detections), len(names) + len(detections)), math.log(LEAST) - 10)
-        for row, detection in enumerate(detections):
+        scores = np.full((len(told), len(names) + len(told)), math.log(LEAST) - 10)
+        for row, detection in enumerate(detections[index] for index in told):
             scores[row, len(names) + row] = math.log(max(detection.unknown, LEAST))
             for name, candidate in detection.candidates.items():
                 scores[row, names.index(name)] = self._score(name, candidate)
         rows, columns = linear_sum_assignment(-scores)
         return {
-            names[column]: detections[row].candidates[names[column]]
+            names[column]: told[row]
             for row, column in zip(rows, columns, strict=True)
-            if column < len(names) and names[column] in detections[row].candidates
+            if column < len(names) and names[column] in detections[told[row]].candidates
         }
 
     def _score(self, name: str, candidate: Candidate) -> float:
@@ -216,21 +231,21 @@ class Tracker:
         sigma = math.sqrt(before * seen.sigma**2 / (before + seen.sigma**2))
         self.tracks[name] = Track(pose, sigma)
 
-    def _miss(self, name: str, place: Callable[[str, Pose], Place]) -> None:
-        track = self.tracks[name]
-        if track.hand is not None:
-            return
-        verdict = place(name, track.pose)
-        if verdict is Place.EMPTY or self._taken_by_another(name):
-            del self.tracks[name]
-            self.gone.add(name)
-        else:
-            self.tracks[name] = replace(track, visible=verdict is Place.TAKEN)
+    def _missed(self, name: str, found: Iterable[str], place: Callable[[str, Pose], Place]) -> Place:
+        """What became of a thing that is not among those found: it is felt in a hand, still there, hidden, or
+        gone, since something else is there now or because it would float."""
+        if self.tracks[name].hand is not None:
+            return Place.TAKEN
+        verdict = place(name, self.tracks[name].pose)
+        if any(self._overlap(name, other) for other in found):
+            return Place.EMPTY
+        if verdict is Place.HIDDEN and not self.on_table(name) and not self._carried(name):
+            return Place.EMPTY
+        return verdict
 
-    def _taken_by_another(self, name: str) -> bool:
-        """Whether something in view is where this one was."""
-        seen = (other for other, track in self.tracks.items() if other != name and track.visible)
-        return any(self._overlap(name, other) for other in seen)
+    def _carried(self, name: str) -> bool:
+        """Whether something is where a thing's underside is."""
+        return any(abs(self.bottom(name) - self.top(other)) < LOOSE / 2 for other in self._below(name))
 
     def _overlap(self, name: str, other: str) -> bool:
         p, q = self.tracks[name].pose[:3, 3], self.tracks[other].pose[:3, 3]
@@ -239,7 +254,7 @@ class Tracker:
         room = min(*self.shapes[name].extent, *self.shapes[other].extent) / 2
         return bool(deep > WITHIN and sideways < room)
 
-    def _explain(self, name: str, glimpses: Mapping[str, float], vanished: set[str]) -> None:
+    def _explain(self, name: str, glimpsed: set[str], vanished: set[str]) -> None:
         """What seems to rest on nothing rests on something hidden: of what is missing, what fits between.
 
         That is what a glimpse shows, or else the only thing of the right height that has just vanished.
@@ -252,7 +267,7 @@ class Tracker:
             gap = self.bottom(name) - floor
             missing = {n for n in self.shapes if n not in self.tracks}
             heights = {n: self.shapes[n].height for n in missing if self.shapes[n].height < gap + TOUCHING}
-            shown = [n for n in heights if glimpses.get(n, 0.0) > 0.5]
+            shown = [n for n in heights if n in glimpsed]
             fitting = [n for n in vanished & heights.keys() if abs(heights[n] - gap) < TOUCHING / 2]
             if gap < TOUCHING or not (shown or len(fitting) == 1):
                 return
@@ -290,6 +305,13 @@ class Tracker:
         names: Iterable[str] = [*saved["tracks"], *saved["gone"]]
         if not set(names) <= set(self.shapes):
             raise ValueError("it speaks of other things")
+        rows = saved["tracks"].values()
+        if not {row["hand"] for row in rows} <= {None, *HANDS}:
+            raise ValueError("it speaks of other hands")
+        if any((row["hand"] is None) != (row["in_hand"] is None) for row in rows):
+            raise ValueError("a thing is held without a place in the hand, or the other way round")
+        for pose in (row[key] for row in rows for key in ("pose", "in_hand") if row[key] is not None):
+            _check_pose(np.array(pose, float))
         self.tracks = {
             name: Track(
                 np.array(row["pose"], float).reshape(4, 4),
@@ -322,3 +344,10 @@ def _held_as_seen(track: Track, seen: Candidate) -> Track:
 
 def _yaw(pose: Pose) -> float:
     return math.atan2(pose[1, 0], pose[0, 0])
+
+
+def _check_pose(pose: Pose) -> None:
+    if pose.shape != (4, 4) or not np.isfinite(pose).all():
+        raise ValueError("a pose is a matrix of 4 by 4 finite numbers")
+    if not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-6):
+        raise ValueError("a pose needs a rotation")

@@ -19,7 +19,7 @@ from sim.footprint import Capsule, Point, footprint, on_table, smallest_gap
 from sim.hands import BENDS, PALM_SIGN, SIDES, Posture, limbs
 from sim.kinematics import HandTarget, Vector, palm_axis
 from sim.robot import Robot
-from sim.skills.base import come_down
+from sim.skills.base import come_down, looked_for
 from sim.skills.tool import obstacles
 from sim.world import Joints
 
@@ -380,8 +380,7 @@ def _perform(robot: Robot, obj: str, hand: str, motion: Motion) -> bool:
 
 def judge(robot: Robot, obj: str, before: Vector, towards: float, touched: bool) -> FailureReason:
     """What the observed displacement says of a sweep."""
-    robot.perception.look()
-    if obj not in robot.perception.names():
+    if not looked_for(robot, obj):
         return FailureReason.OFF_TABLE
     if not touched:
         return FailureReason.NO_CONTACT

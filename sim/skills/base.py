@@ -60,8 +60,16 @@ def come_down(robot: Robot, hand: str, name: str, down: Sequence[Joints], second
     return not felt
 
 
+def looked_for(robot: Robot, name: str) -> bool:
+    """Look, and say whether a thing is still there: somebody may have taken it, or it fell off the table."""
+    robot.perception.look()
+    return name in robot.perception.names()
+
+
 def release(robot: Robot, hand: str, opening: float) -> None:
     """Open the hand where it is and forget the grip."""
+    robot.perception.feel()  # where the thing is that is let go: afterwards the hand tells no more
     robot.world.move_fingers(hand, opening)
+    robot.perception.feel()
     robot.world.hold(0.1)
     robot.grips.pop(hand, None)

@@ -11,6 +11,7 @@ from cognitive_arch.execution.environment import FailureReason
 from sim.footprint import disc, footprint, outer_radius, smallest_gap
 from sim.kinematics import HandTarget
 from sim.robot import Robot
+from sim.skills.base import looked_for
 from sim.skills.put import level_targets, set_down
 from sim.skills.tool import held_tool, lay_targets
 
@@ -25,8 +26,8 @@ def drop(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     if robot.perception.held(hand) != name or hand not in robot.grips:
         return FailureReason.HAND_EMPTY
     reason = set_down(robot, hand, _targets(robot, name, hand))
-    robot.perception.look()
-    if reason is FailureReason.NONE and not robot.perception.on_table(name):
+    there = looked_for(robot, name)
+    if reason is FailureReason.NONE and not (there and robot.perception.on_table(name)):
         return FailureReason.MISPLACED
     return reason
 

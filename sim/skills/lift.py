@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cognitive_arch.execution.environment import FailureReason
 from sim.robot import Robot
-from sim.skills.base import release
+from sim.skills.base import looked_for, release
 from sim.skills.grasp import pick_up
 
 HELD_UP = 0.5  # s
@@ -31,7 +31,8 @@ def lift(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     release(robot, hand, grip.opening)
     world.follow([world.with_fingers(q, hand, grip.opening) for q in way_up], 0.9)
     robot.go_home(hand)
-    robot.perception.look()
+    if not looked_for(robot, name):
+        return FailureReason.MISPLACED
     # It is to stand again on what it stood on.
     back = set(robot.perception.supports(name)) == set(beneath)
     on_table = bool(beneath) or robot.perception.on_table(name)

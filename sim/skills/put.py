@@ -10,7 +10,7 @@ from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.world.observation import HANDS
 from sim.kinematics import HandTarget, Vector, finger_directions
 from sim.robot import YAWS, Robot
-from sim.skills.base import release
+from sim.skills.base import looked_for, release
 from sim.skills.grasp import object_target
 
 GAP = 0.002  # m left under the object when the hand opens
@@ -31,8 +31,8 @@ def put_on(robot: Robot, args: tuple[str, ...]) -> FailureReason:
     reason = set_down(robot, hand, level_targets(robot, hand, place + aim), [target])
     if reason is FailureReason.OUT_OF_REACH and robot.kinematics.reaches(hand, *map(float, p_WT[:2])):
         return FailureReason.BLOCKED
-    robot.perception.look()
-    if reason is FailureReason.NONE and target not in robot.perception.supports(name):
+    there = looked_for(robot, name)
+    if reason is FailureReason.NONE and not (there and target in robot.perception.supports(name)):
         return FailureReason.MISPLACED
     return reason
 

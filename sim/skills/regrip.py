@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterator
 from cognitive_arch.execution.environment import FailureReason
 from sim.robot import Robot
 from sim.skills.bare import judge
+from sim.skills.base import looked_for
 from sim.skills.grasp import take
 from sim.skills.put import set_down
 from sim.skills.tool import HeldTool, Motion, Sweep, first_feasible, held_tool, lay_targets, perform, unusable
@@ -27,7 +28,8 @@ def sweep_with_tool(
     reason = unusable(robot, obj, name, hand)
     if reason is not None:
         return reason
-    robot.perception.look()  # a tool may have turned in the hand
+    if not looked_for(robot, obj):  # a tool may have turned in the hand, too
+        return FailureReason.UNKNOWN_OBJECT
     tool = held_tool(robot, name, hand)
     if with_bar and (tool is None or tool.shape.bar <= 0):
         return FailureReason.CANNOT_PULL

@@ -10,6 +10,7 @@ from cognitive_arch.execution.environment import FailureReason
 from sim.kinematics import Vector
 from sim.robot import Robot
 from sim.skills.bare import Stance, clear, obstacles, stance, unusable, upright_pitch
+from sim.skills.base import looked_for
 from sim.world import Joints
 
 ABOVE = 0.09  # m over the object from which the finger tips come
@@ -48,7 +49,8 @@ def touch(robot: Robot, args: tuple[str, ...]) -> FailureReason:
         world.hold(DWELL)
     world.follow([near, way[-1]], 0.9)
     robot.go_home(hand)
-    robot.perception.look()
+    if not looked_for(robot, obj):
+        return FailureReason.OFF_TABLE
     if not touched:
         return FailureReason.NO_CONTACT
     moved = float(np.linalg.norm(robot.perception.pose(obj).translation() - before))

@@ -10,7 +10,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cognitive_arch.domain import load_domain
-from cognitive_arch.execution.environment import Outcome
+from cognitive_arch.execution.environment import FailureReason, Outcome
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.scenes import load_scene
 from cognitive_arch.world.anchoring import WorldModel
@@ -113,6 +113,31 @@ def test_what_slips_from_the_hand_is_noticed(kitchen: DrakeEnvironment) -> None:
     assert seen == true(kitchen)
 
 
+@pytest.mark.parametrize("call", ["putOnWith(Ham,Bun-bottom,RightHand)", "dropWith(Ham,RightHand)"])
+def test_what_somebody_takes_as_the_hand_opens_is_missed(
+    kitchen: DrakeEnvironment, monkeypatch: pytest.MonkeyPatch, call: str
+) -> None:
+    kitchen.execute(action("graspWith(Ham,RightHand)"))
+    opened = kitchen.world.move_fingers
+
+    def open_and_lose(hand: str, opening: float, seconds: float = 0.4) -> None:
+        opened(hand, opening, seconds)
+        kitchen.world.park("Ham")
+
+    monkeypatch.setattr(kitchen.world, "move_fingers", open_and_lose)
+    result = kitchen.execute(action(call))
+    assert result.outcome is Outcome.FAILURE
+    assert result.reason is FailureReason.MISPLACED
+    assert "Ham" in kitchen.observe().absent
+
+
+def test_what_a_hand_lets_go_of_is_not_believed_to_float(kitchen: DrakeEnvironment) -> None:
+    kitchen.execute(action("graspWith(Ham,LeftHand)"))
+    kitchen.disturb(OutsideEvent.parse("1:remove:Ham"))
+    assert kitchen.observe().absent == ("Ham",)
+    assert believed(kitchen) == true(kitchen)
+
+
 def test_memory_is_saved_with_the_rest(kitchen: DrakeEnvironment) -> None:
     put_somewhere(kitchen, "Ham", -0.302, 0.001, kitchen.world.height("Bun-bottom"))
     before = kitchen.observe()
@@ -127,4 +152,4 @@ def test_random_scenes_piles_and_full_hands(seed: int) -> None:
     for look in looks(seed):
         assert np.median(list(look.errors.values())) < 0.005
         assert max(look.errors.values()) < 0.012
-        assert len(look.wrong) + len(look.overlooked) <= 0.02 * look.atoms
+        assert len(look.wrong) + len(look.overlooked) <= 0.01 * look.atoms

@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from cognitive_arch.shapes import Box, Cylinder, Shape
-from cognitive_arch.world.tracking import Candidate, Detection, HandSense, Place, Pose, Tracker
+from cognitive_arch.world.tracking import Candidate, Detection, HandSense, Place, Pose, Track, Tracker
 
 TABLE = -0.096
 BUN = Cylinder(type="cylinder", radius=0.03, height=0.02)
@@ -131,6 +131,9 @@ def test_what_is_in_a_hand_moves_with_it_and_is_let_go_with_the_grip(tracker: Tr
     assert "Ham" in tracker.tracks, "a full hand is felt, be it seen or not"
     tracker.feel(hands())
     assert tracker.held("LeftHand") is None
+    assert tracker.tracks["Ham"].pose[:2, 3] == pytest.approx((-0.2, -0.1)), "the hand tells no more"
+    look(tracker, Ham=Place.HIDDEN)
+    assert tracker.gone == {"Ham"}, "nothing floats"
 
 
 def test_eyes_overrule_a_hand_that_holds_something_else(tracker: Tracker) -> None:
@@ -150,6 +153,35 @@ def test_more_looks_at_a_thing_at_rest_make_its_place_more_exact(tracker: Tracke
     assert tracker.tracks["Ham"].pose[:2, 3] == pytest.approx((-0.3, 0.0), abs=0.0025)
     look(tracker, seen(lying("Ham", -0.32, 0.0), 0.002, Ham=0.97))
     assert tracker.tracks["Ham"].pose[0, 3] == pytest.approx(-0.32), "what was moved is where it is now"
+
+
+def test_the_order_of_tracks_does_not_matter() -> None:
+    for names in (("Ham", "Tile"), ("Tile", "Ham")):
+        tracker = Tracker(SHAPES, TABLE)
+        tracker.tracks = {name: Track(lying(name, -0.3, 0.0), 0.001) for name in names}
+        look(tracker, Ham=Place.HIDDEN, Tile=Place.HIDDEN)
+        assert set(tracker.tracks) == {"Ham", "Tile"}
+
+
+def test_a_glimpse_of_what_was_moved_keeps_it_in_mind(tracker: Tracker) -> None:
+    look(tracker, seen(lying("Ham", -0.3, 0.1), Ham=0.97))
+    there = {"Ham": Candidate(0.9, lying("Ham", -0.5, 0.0), 0.01)}
+    look(tracker, Detection(there, 0.1, glimpse=True), Ham=Place.EMPTY)
+    assert not tracker.tracks["Ham"].visible
+    assert tracker.tracks["Ham"].pose[0, 3] == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize(
+    ("field", "value", "says"),
+    [("hand", "Nose", "other hands"), ("pose", [[0.0] * 4] * 4, "rotation"), ("in_hand", None, "without")],
+)
+def test_damaged_memory_is_refused(tracker: Tracker, field: str, value: object, says: str) -> None:
+    look(tracker, seen(lying("Ham", -0.3, 0.1), Ham=0.97))
+    tracker.take_hold("LeftHand", "Ham", at(-0.3, 0.1, 0.0), lying("Ham", -0.3, 0.1))
+    saved = tracker.to_json()
+    saved["tracks"]["Ham"][field] = value
+    with pytest.raises(ValueError, match=says):
+        Tracker(SHAPES, TABLE).restore(saved)
 
 
 def test_saved_and_restored(tracker: Tracker) -> None:
