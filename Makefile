@@ -32,7 +32,7 @@ demo: setup
 	$(VENV)/bin/cogarch run "make a ham sandwich" --scene simple --backend drake
 
 test: setup
-	$(PY) -m pytest
+	$(PY) -m pytest -n 2 --dist loadfile
 
 lint: setup
 	$(VENV)/bin/ruff check .
