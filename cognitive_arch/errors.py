@@ -59,9 +59,13 @@ class SweepError(CogArchError):
 
 
 def one_line(text: object, limit: int = 80) -> str:
-    """`text` in printable form on one line, cut to `limit` characters (for quoting bad input)."""
+    """`text` in printable form on one line, its middle cut out beyond `limit` characters (for quoting bad
+    input: of a path both ends tell something)."""
     flat = " ".join("".join(c if c.isprintable() else " " for c in str(text)).split())
-    return flat if len(flat) <= limit else flat[: limit - 3] + "..."
+    if len(flat) <= limit:
+        return flat
+    end = (limit - 3) // 2
+    return f"{flat[: limit - 3 - end]}...{flat[len(flat) - end :]}"
 
 
 def unknown(what: str, got: object, valid: Iterable[str]) -> str:

@@ -43,7 +43,7 @@ PHRASES = sorted(
 
 
 def check_survives(sentence: str, scene: tuple[str, ...]) -> None:
-    start, message = time.perf_counter(), ""
+    start, message = time.process_time(), ""
     try:
         first = parse_instruction(sentence, DOMAIN, scene)
         SemanticMemory(DOMAIN).expand(first, scene)
@@ -51,7 +51,7 @@ def check_survives(sentence: str, scene: tuple[str, ...]) -> None:
         message = str(error)
     assert "\n" not in message
     assert len(message) < 600
-    assert time.perf_counter() - start < 1
+    assert time.process_time() - start < 1
 
 
 @settings(max_examples=300, deadline=None)

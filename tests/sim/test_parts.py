@@ -139,7 +139,7 @@ def test_too_wide_to_grasp(domain: Domain) -> None:
         {"shape": {"type": "box", "size": [0.2, 0.2, 0.01]}, "mass": 0.1, "color": [1, 0, 0]}
     )
     bigger = domain.model_copy(update={"objects": {**domain.objects, "Ham": wide}})
-    environment = DrakeEnvironment(bigger, load_scene("simple"))
+    environment = DrakeEnvironment(bigger, load_scene("simple"), perception="oracle")
     environment.reset(0)
     from tests.conftest import action
 
