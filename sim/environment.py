@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -229,5 +230,6 @@ class DrakeEnvironment:
 
     def close(self) -> None:
         """See `Environment.close`."""
-        self._robot = None
-        self._stage = None
+        self._robot = self._stage = self._eyes = None
+        # Renderers and plants are few objects of many megabytes: the collector would wait too long.
+        gc.collect()
