@@ -87,6 +87,11 @@ class Domain(Frozen):
     def rules_path(self) -> Path:
         return self.folder / "rules.nid"
 
+    @property
+    def recogniser_path(self) -> Path:
+        """What was learnt of how its objects look."""
+        return self.folder / "recogniser.npz"
+
 
 class Placement(Frozen):
     """Where an object lies: centre on the table (metres) and yaw (radians).

@@ -88,8 +88,12 @@ class Setting:
         return setting
 
     def fingerprint(self) -> str:
-        """Changes with anything in the files of scene, domain or rules that means something."""
+        """Changes with all that means something in the files of scene, domain and rules, and with what was
+        learnt of how the domain's objects look."""
         parts = [self.scene.model_dump_json(), self.domain.model_dump_json(), repr(self.rules.rules)]
+        learnt = self.domain.recogniser_path
+        if learnt.is_file():
+            parts.append(hashlib.sha256(learnt.read_bytes()).hexdigest())
         return hashlib.sha256("\n".join(parts).encode()).hexdigest()[:16]
 
     def _check_rules(self) -> None:

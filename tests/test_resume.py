@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from cognitive_arch import session
+from cognitive_arch import runs
 from cognitive_arch.errors import CogArchError, ConfigError, StateError, StoreError
 from cognitive_arch.execution.episode import Step
 from cognitive_arch.execution.heuristics import Heuristics
@@ -21,7 +21,7 @@ from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.outside import OutsideEvent
 from cognitive_arch.runlog.store import RunStatus, RunStore
 from cognitive_arch.runs import resume_task, run_task
-from cognitive_arch.session import Progress, RunConfig
+from cognitive_arch.session import Progress, RunConfig, Setting
 
 SANDWICH = "make a ham sandwich"
 
@@ -157,11 +157,11 @@ def test_what_cannot_be_gone_on_with(tmp_path: Path, monkeypatch: pytest.MonkeyP
         with pytest.raises(StoreError, match="still running"):
             resume_task(run_id, tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr(session, "versions", lambda: {"git": "0123456"})
+        patch.setattr(runs, "versions", lambda: {"git": "0123456"})
         with pytest.raises(StoreError, match=r"was begun with .*, this is .*git 0123456.*: .*run it anew"):
             resume_task(run_id, tmp_path)
     with monkeypatch.context() as patch:
-        patch.setattr(session.Setting, "fingerprint", lambda self: "another")
+        patch.setattr(Setting, "fingerprint", lambda self: "another")
         with pytest.raises(StoreError, match="have changed since"):
             resume_task(run_id, tmp_path)
     # None of the refusals did it any harm.

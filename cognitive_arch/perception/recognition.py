@@ -28,6 +28,7 @@ UNKNOWN = "unknown"
 FILE = "recogniser.npz"
 FORMAT = 1
 MAX_BYTES = 5_000_000
+MAX_DEPTH = 100
 COLOR_COLUMNS = [FEATURES.index(name) for name in COLORS]
 FALL_OFF = 4.0  # how quickly a name gets unlikely beyond the distance that its examples have
 Array = NDArray[np.float32]
@@ -58,6 +59,23 @@ class Forest:
         # Kept in few bytes, used as what numpy indexes with: half of the time went into the conversion.
         for name in ("roots", "feature", "child"):
             object.__setattr__(self, name, getattr(self, name).astype(np.intp))
+        self._check()
+
+    def _check(self) -> None:
+        """Raise `ValueError` for arrays that do not fit together: kernels look nothing up twice."""
+        n = len(self.child)
+        if not n == len(self.feature) == len(self.threshold) == len(self.value):
+            raise ValueError("its nodes have arrays of different lengths")
+        if self.roots.ndim != 2 or self.roots.shape[1:] != self.start.shape:
+            raise ValueError("its trees and answers do not fit together")
+        last = self.child + (self.threshold < np.inf)
+        for what, index, end in (("root", self.roots, n), ("child", last, n), ("child", self.child, n)):
+            if index.size and not (index.min() >= 0 and index.max() < end):
+                raise ValueError(f"a {what} is not among its nodes")
+        if n and not (self.feature.min() >= 0 and self.feature.max() < len(FEATURES)):
+            raise ValueError("it asks for unknown features")
+        if not 0 <= self.depth <= MAX_DEPTH:
+            raise ValueError(f"a depth of {self.depth}")
 
     def scores(self, features: Array) -> NDArray[np.float64]:
         """What the trees say to features (n_features,): (n_answers,)."""
@@ -82,6 +100,12 @@ class ObjectRecogniser:
     whitenings: Array
     limits: Array
     told: Mapping[str, Any]
+
+    def __post_init__(self) -> None:
+        known, colors = len(self.names) - 1, len(COLORS)
+        found = (self.forest.start.shape, self.means.shape, self.whitenings.shape, self.limits.shape)
+        if found != ((known + 1,), (known, colors), (known, colors, colors), (known,)):
+            raise ValueError(f"its names and arrays do not fit together: {found}")
 
     def classify(self, image: Image, mask: Mask) -> list[tuple[str, float]]:
         """What the region `mask` (height, width) bool of `image` (height, width, 3) uint8 RGB shows: all

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -239,3 +240,26 @@ def test_loading_is_quick() -> None:
     started = time.process_time()
     ObjectRecogniser.load(recogniser_path("sandwich"))
     assert time.process_time() - started < 0.5
+
+
+@pytest.mark.parametrize(
+    ("field", "change"),
+    [
+        ("forest_feature", lambda array: array[:10]),
+        ("forest_child", lambda array: array + 100_000),
+        ("forest_feature", lambda array: array + 1000),
+        ("forest_roots", lambda array: array[:, :-1]),
+        ("forest_depth", lambda array: np.array(-1)),
+        ("means", lambda array: array[:, :-1]),
+        ("limits", lambda array: array[:-1]),
+    ],
+)
+def test_arrays_that_do_not_fit_together_are_refused(
+    tmp_path: Path, field: str, change: Callable[[np.ndarray], np.ndarray]
+) -> None:
+    with np.load(recogniser_path("toys")) as data:
+        arrays = {name: data[name] for name in data.files}
+    arrays[field] = change(arrays[field])
+    np.savez(tmp_path / "r.npz", **arrays)
+    with pytest.raises(PerceptionError, match="no recogniser"):
+        ObjectRecogniser.load(tmp_path / "r.npz")
