@@ -64,8 +64,8 @@ def tool_footprint(shape: ToolShape, centre: Point, yaw: float) -> tuple[Capsule
     shaft = Capsule(at(width - half, 0.0), at(half - width, 0.0), width)
     if shape.bar <= 0:
         return (shaft,)
-    side = shape.bar / 2 - width
-    return (shaft, Capsule(at(width - half, -side), at(width - half, side), width))
+    low, high = shape.sides
+    return (shaft, Capsule(at(width - half, low + width), at(width - half, high - width), width))
 
 
 def _distance(first: Capsule, second: Capsule) -> float:

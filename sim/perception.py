@@ -156,7 +156,7 @@ class Perception(ABC):
         shape = self._domain.objects[tool].shape
         assert shape.type == "tool"
         beside = shape.width / 2 + outer_radius(self._domain.objects[name].shape)
-        return shape.bar / 2 >= beside
+        return max(abs(side) for side in shape.sides) >= beside
 
     def _describe(self, name: str, holder: str | None, visible: bool) -> ObjectObservation:
         x, y, z = (float(v) for v in self.pose(name).translation())

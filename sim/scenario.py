@@ -171,7 +171,7 @@ def solid_parts(shape: shapes.Shape) -> list[SolidPart]:
         width = shape.width
         parts = [SolidPart("shaft", RigidTransform(), _box(shape.length, width, width))]
         if shape.bar > 0:
-            X_OB = RigidTransform([-shape.length / 2 + width / 2, 0, 0])
+            X_OB = RigidTransform([-shape.length / 2 + width / 2, shape.offset, 0])
             parts.append(SolidPart("bar", X_OB, _box(width, shape.bar, width)))
         return parts
     if not isinstance(shape, shapes.Compound):

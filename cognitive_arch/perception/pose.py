@@ -195,7 +195,7 @@ def outline_distance(shape: Shape) -> Distance:
         shaft = _rectangle((0.0, 0.0), shape.length, shape.width)
         if shape.bar <= 0:
             return shaft
-        head = _rectangle((-shape.length / 2 + shape.width / 2, 0.0), shape.width, shape.bar)
+        head = _rectangle((-shape.length / 2 + shape.width / 2, shape.offset), shape.width, shape.bar)
         return lambda p: np.minimum(shaft(p), head(p))
     parts = [_part_distance(part.solid, part.place) for part in shape.parts]
     return lambda p: np.min([part(p) for part in parts], axis=0)

@@ -80,7 +80,7 @@ def _outlines(shape: Shape) -> list[Outline]:
         parts = [_rectangle((0.0, 0.0), (shape.length, shape.width))]
         if shape.bar > 0:
             head = shape.width / 2 - shape.length / 2
-            parts.append(_rectangle((head, 0.0), (shape.width, shape.bar)))
+            parts.append(_rectangle((head, shape.offset), (shape.width, shape.bar)))
         return parts
     if isinstance(shape, Compound):
         return [_of_solid(part.solid, part.place) for part in shape.parts]

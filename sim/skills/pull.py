@@ -50,6 +50,8 @@ def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
     for closer, y, skew, side in itertools.product(CLOSER, SIDEWAYS, SKEWS, (1.0, -1.0)):
         end = (place[0] + closer, y)
         course = math.atan2(end[1] - place[1], end[0] - place[0])
+        if not _bar_is_there(tool, side):
+            continue
         # Pulled askew the object slides along the bar: it must slide towards the shaft.
         if end[0] > NEAREST_END or abs(course) > 0.9 or skew * side > 0:
             continue
@@ -75,6 +77,13 @@ def _sweeps(robot: Robot, tool: HeldTool, obj: str) -> Iterator[Sweep]:
             sweep = replace(flat, pitch=pitch)
             if is_free(robot, tool, sweep, others):
                 yield sweep
+
+
+def _bar_is_there(tool: HeldTool, side: float) -> bool:
+    """A hook has its bar on one side of the shaft only, a rake on both."""
+    low, high = tool.shape.sides
+    reach, other = (high, -low) if side > 0 else (-low, high)
+    return reach >= other
 
 
 def _sweep(tool: HeldTool, place: Point, end: Point, radius: float, side: float, skew: float) -> Sweep:

@@ -91,8 +91,8 @@ class HeldTool:
         def at(along: float, across: float = 0.0) -> Point:
             return (head[0] + along * cos - across * sin, head[1] + along * sin + across * cos)
 
-        side = max(0.0, self.shape.bar / 2 - half)
-        parts = [(Capsule(at(0.0, -side), at(0.0, side), half), FLOAT)]
+        low, high = self.shape.sides
+        parts = [(Capsule(at(0.0, low + half), at(0.0, high - half), half), FLOAT)]
         ends = np.linspace(0.0, self.shape.length - self.shape.width, _SHAFT_PARTS + 1)
         for near, far in itertools.pairwise(float(end) for end in ends):
             parts.append((Capsule(at(near), at(far), half), FLOAT + near * rise))

@@ -6,10 +6,13 @@ import math
 
 import numpy as np
 import pytest
+from pydantic import ValidationError
 
 from cognitive_arch.domain import Domain, Scene, jittered
 from cognitive_arch.execution.environment import FailureReason, Outcome
+from cognitive_arch.perception.top_view import silhouette
 from cognitive_arch.scenes import load_scene
+from cognitive_arch.shapes import ToolShape
 from sim.environment import DrakeEnvironment
 from sim.footprint import Capsule, disc, gap, smallest_gap, tool_footprint
 from sim.trials import mirrored
@@ -44,6 +47,21 @@ def test_the_bar_of_a_rake_is_at_its_far_end(domain: Domain) -> None:
     assert gap(shaft, bar) < 0
     turned = tool_footprint(shape, (0.0, 0.0), math.pi / 2)[1]
     assert turned.a[1] == pytest.approx(bar.a[0])
+
+
+def test_the_bar_of_a_hook_is_on_one_side() -> None:
+    hook = ToolShape(type="tool", length=0.3, width=0.02, bar=0.1, offset=0.04)
+    assert hook.sides == pytest.approx((-0.01, 0.09))
+    assert hook.extent == pytest.approx((0.3, 0.18))  # about the middle of the shaft
+    _, bar = tool_footprint(hook, (0.0, 0.0), 0.0)
+    assert bar.a[1] - bar.radius == pytest.approx(-0.01)
+    assert bar.b[1] + bar.radius == pytest.approx(0.09)
+    for way in (hook, hook.model_copy(update={"offset": -0.04})):
+        seen = silhouette(way)  # up is away from the robot, right is its right
+        head, handle = np.flatnonzero(seen[14]).mean(), np.flatnonzero(seen[-14]).mean()
+        assert head - handle == pytest.approx(1000 * way.offset, abs=1.5)
+    with pytest.raises(ValidationError, match="bar must lie on its shaft"):
+        ToolShape(type="tool", length=0.3, width=0.02, bar=0.1, offset=0.06)
 
 
 def test_jitter_turns_a_tool_only_as_far_as_it_may(domain: Domain, scene: Scene) -> None:
