@@ -8,7 +8,7 @@ sinking into a round one.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,6 +63,7 @@ GAINS: Mapping[str, tuple[float, float]] = {  # N m/rad and N m s/rad; N/m and N
     "knuckle": (10.0, 0.2),
 }
 PAD_SPACING = 0.12  # m at most between the small spheres under long things
+UPPER_PAD = "upper_pad"
 ROTOR_INERTIA, GEAR_RATIO = 1e-5, 100.0
 _TABLE_COLOR = [0.62, 0.50, 0.38, 1.0]
 _LEG_COLOR = [0.35, 0.30, 0.26, 1.0]
@@ -92,6 +93,7 @@ def build_scenario(domain: Domain, scene: Scene, *, friction: float = FRICTION) 
     plant.set_gravity_enabled(robot, False)
     plant.Finalize()
     _let_robot_overlap_itself(plant, scene_graph, robot)
+    _keep_upper_pads_from_pads(plant, scene_graph, robot, objects.values())
     return Scenario(builder, plant, scene_graph, robot, table, objects)
 
 
@@ -263,12 +265,20 @@ def _add_contact_geometry(
     else:
         solid = Box(shape.size[0], shape.size[1], shape.size[2] - core)
     plant.RegisterCollisionGeometry(body, X_OP, solid, label, properties)
-    places = _pad_places(shape) if part.lowest else [(0.0, 0.0)]
-    # What sits on top of another part (a stud) has no underside, but carries what is put on it.
-    z = (-1 if part.lowest else 1) * (shape.height / 2 - PAD_RADIUS)
-    for i, (x, y) in enumerate(places):
-        X_PS = RigidTransform([x, y, z])
-        plant.RegisterCollisionGeometry(body, X_OP @ X_PS, Sphere(PAD_RADIUS), f"{label}_pad_{i}", properties)
+    z = shape.height / 2 - PAD_RADIUS
+
+    def add_pads(kind: str, places: Sequence[tuple[float, float]], z: float) -> None:
+        for i, (x, y) in enumerate(places):
+            X_OS = X_OP @ RigidTransform([x, y, z])
+            plant.RegisterCollisionGeometry(body, X_OS, Sphere(PAD_RADIUS), f"{label}_{kind}_{i}", properties)
+
+    if part.lowest:
+        add_pads("pad", _pad_places(shape), -z)
+        # Turned over, a bare face would sink into the table: between two flat faces there is one contact only.
+        add_pads(UPPER_PAD, _pad_places(shape), z)
+    else:
+        # What sits on top of another part (a stud) has no underside, but carries what is put on it.
+        add_pads("pad", [(0.0, 0.0)], z)
 
 
 def _pad_places(shape: shapes.Cylinder | shapes.Box) -> list[tuple[float, float]]:
@@ -321,3 +331,21 @@ def _let_robot_overlap_itself(
             if frame is not None and not plant.get_body(index).name().startswith(other_arm):
                 own.Add(frame)
         scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeWithin(own))
+
+
+def _keep_upper_pads_from_pads(
+    plant: MultibodyPlant, scene_graph: SceneGraph, robot: ModelInstanceIndex, objects: Iterable[RigidBody]
+) -> None:
+    """What an upright thing carries rests on its flat top, and so do fingers: pad on pad is a bumpy ride."""
+    upper, lower, inspector = GeometrySet(), GeometrySet(), scene_graph.model_inspector()
+    for body in objects:
+        for geometry in plant.GetCollisionGeometriesForBody(body):
+            name = inspector.GetName(geometry)
+            if UPPER_PAD in name:
+                upper.Add(geometry)
+            elif "pad" in name:
+                lower.Add(geometry)
+    for index in plant.GetBodyIndices(robot):
+        lower.Add(plant.GetBodyFrameIdOrThrow(index))
+    filters = scene_graph.collision_filter_manager()
+    filters.Apply(CollisionFilterDeclaration().ExcludeWithin(upper).ExcludeBetween(upper, lower))

@@ -8,8 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
 
-from cognitive_arch.domain import Domain, ObjectSpec
+from cognitive_arch.domain import Domain, ObjectSpec, load_domain
 from cognitive_arch.errors import BackendError
 from cognitive_arch.scenes import load_scene
 from sim import rendering
@@ -144,3 +145,22 @@ def test_too_wide_to_grasp(domain: Domain) -> None:
     from tests.conftest import action
 
     assert str(environment.execute(action("graspWith(Ham,LeftHand)")).reason) == "too_wide"
+
+
+@pytest.mark.parametrize("roll", [math.pi, math.pi - 0.15])
+@pytest.mark.parametrize("name", ["simple", "toys"])
+def test_what_was_turned_over_lies_on_the_table_and_not_in_it(name: str, roll: float) -> None:
+    scene = load_scene(name)
+    domain = load_domain(scene.domain)
+    flat = [n for n in scene.objects if domain.objects[n].shape.type in ("box", "cylinder")]
+    world = World(domain, scene)
+    world.reset(dict(scene.objects))
+    tops = {n: scene.table.height + world.height(n) / 2 for n in flat}
+    for i, thing in enumerate(flat):
+        place = [-0.65, -0.4 + 0.2 * i, tops[thing] + 0.01]
+        world.place(thing, RigidTransform(RollPitchYaw(roll, 0.0, 0.0), place))
+    world.hold(0.8)
+    for thing in flat:
+        pose = world.pose(thing)
+        assert pose.rotation().matrix()[2, 2] < -0.99
+        assert pose.translation()[2] == pytest.approx(tops[thing], abs=0.001)
