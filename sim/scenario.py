@@ -274,7 +274,7 @@ def _add_contact_geometry(
 
     if part.lowest:
         add_pads("pad", _pad_places(shape), -z)
-        # Turned over, a bare face would sink into the table: between two flat faces there is one contact only.
+        # Turned over, a bare face would sink into the table: two flat faces have but one contact.
         add_pads(UPPER_PAD, _pad_places(shape), z)
     else:
         # What sits on top of another part (a stud) has no underside, but carries what is put on it.
