@@ -57,6 +57,7 @@ class CameraPerception(Perception):
         self._descriptors: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
         self.image: EyeImage | None = None
         self.sightings: Sequence[Sighting] = ()
+        self._names: dict[int, str] = {}  # what sightings are taken to be, by index
 
     @property
     def time(self) -> float:
@@ -66,17 +67,22 @@ class CameraPerception(Perception):
 
     def look(self) -> None:
         """See `Perception.look`."""
-        if self._looked == self._world.time:
+        known = self._looked == self._world.time
+        if known and self.image is not None:
             return
         self._looked = self._world.time
         self.image = image = self._eyes.look(self._world.positions())
         view = SceneView(image.color, image.depth, image.own, image.camera, self._table)
         self.sightings = sightings(view, self._classify, self._shapes)
-        found = self._tracker.update(
-            [_detection(sighting) for sighting in self.sightings],
-            self._senses(),
-            lambda name, pose: _judge(image, self._shapes[name], pose),
-        )
+        detections = [_detection(sighting) for sighting in self.sightings]
+        if known:  # what a restored robot saw last is what it sees, and what it made of that is restored
+            found = self._tracker.associate(detections)
+        else:
+            found = self._tracker.update(
+                detections, self._senses(), lambda name, pose: _judge(image, self._shapes[name], pose)
+            )
+        glimpsed = {index: one.best[0] for index, one in enumerate(detections) if one.telling}
+        self._names = glimpsed | {index: name for name, index in found.items()}
         for name, index in found.items():
             if self.sightings[index].whole:
                 self._descriptors[name] = _described(self.sightings[index])
@@ -132,7 +138,7 @@ class CameraPerception(Perception):
         hidden = {name: track.pose[:3, 3] for name, track in tracks if not track.visible}
         places = self.image.camera.project(np.array(list(hidden.values())).reshape(-1, 3))
         remembered = {name: (float(x), float(y)) for name, (x, y) in zip(hidden, places, strict=True)}
-        return draw(self.image.color, self.sightings, self.image.own, remembered)
+        return draw(self.image.color, self.sightings, self._names, self.image.own, remembered)
 
     # -- what is believed -----------------------------------------------------------------------------------
 

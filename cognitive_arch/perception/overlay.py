@@ -8,9 +8,10 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from cognitive_arch.perception.scene import UNKNOWN, Sighting
+from cognitive_arch.perception.scene import Sighting
 
 Pixels = NDArray[np.uint8]  # (height, width, 3), RGB
+NAMELESS = "?"
 SEEN, DOUBTED, REMEMBERED, OWN = (20, 130, 60), (200, 60, 30), (40, 80, 200), (120, 120, 120)
 PAPER, INK = (255, 255, 255), (20, 20, 20)
 FONT, SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
@@ -19,23 +20,25 @@ FONT, SIZE = cv2.FONT_HERSHEY_SIMPLEX, 0.42
 def draw(
     color: Pixels,
     sightings: Sequence[Sighting],
+    names: Mapping[int, str],
     own: NDArray[np.bool_] | None = None,
     remembered: Mapping[str, tuple[float, float]] | None = None,
 ) -> Pixels:
-    """A copy of `color` with what is in view outlined and named; `own` is the robot's body, greyed, and
-    `remembered` are the pixels of things that are believed to be there and not seen."""
+    """A copy of `color` with what is in view outlined and named: `names` says, by index, what sightings are
+    taken to be, and the others are `NAMELESS`. `own` is the robot's body, greyed, and `remembered` are the
+    pixels of things that are believed to be there and not seen."""
     picture = color.copy()
     if own is not None:
         picture[own] = (picture[own] // 2 + np.array(OWN, np.uint8) // 2).astype(np.uint8)
-    for sighting in sightings:
-        name, certain = sighting.label, sighting.label != UNKNOWN
-        contours, _ = cv2.findContours(
-            sighting.region.mask.astype(np.uint8), cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE
-        )
-        cv2.drawContours(picture, contours, -1, SEEN if certain else DOUBTED, 1, cv2.LINE_AA)
-        chance = sighting.hypotheses[name].probability if certain else sighting.unknown
-        x, y, width, _ = cv2.boundingRect(sighting.region.mask.astype(np.uint8))
-        label(picture, f"{name} {chance:.2f}", (x + width / 2, y - 6), SEEN if certain else DOUBTED)
+    for index, sighting in enumerate(sightings):
+        name = names.get(index)
+        shade = DOUBTED if name is None else SEEN
+        mask = sighting.region.mask.astype(np.uint8)
+        contours, _ = cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_SIMPLE)
+        cv2.drawContours(picture, contours, -1, shade, 1, cv2.LINE_AA)
+        x, y, width, _ = cv2.boundingRect(mask)
+        text = NAMELESS if name is None else f"{name} {sighting.hypotheses[name].probability:.2f}"
+        label(picture, text, (x + width / 2, y - 6), shade)
     for name, place in (remembered or {}).items():
         if np.isfinite(place).all():
             cv2.drawMarker(picture, _pixel(place), REMEMBERED, cv2.MARKER_TILTED_CROSS, 10, 1, cv2.LINE_AA)

@@ -63,6 +63,11 @@ class Detection:
         name = max(chances, key=lambda name: chances[name])
         return name, chances[name]
 
+    @property
+    def telling(self) -> bool:
+        """Whether it is a glimpse that tells what it shows."""
+        return self.glimpse and bool(self.candidates) and self.best[1] > CONVINCING
+
 
 class Place(Enum):
     """What is to be seen where a thing should be."""
@@ -111,7 +116,7 @@ class Tracker:
         Returns which detection (its index) each thing in view is taken to be.
         """
         self.feel(hands)
-        found = self._associate(detections)
+        found = self.associate(detections)
         for name, index in found.items():
             self._see(name, detections[index].candidates[name])
         missing = [name for name in self.tracks if name not in found]
@@ -122,7 +127,7 @@ class Tracker:
                 self.gone.add(name)
             else:
                 self.tracks[name] = replace(self.tracks[name], visible=verdict is Place.TAKEN)
-        glimpses = [d for d in detections if d.glimpse and d.candidates and d.best[1] > CONVINCING]
+        glimpses = [detection for detection in detections if detection.telling]
         for name in sorted(self.tracks, key=self.bottom):
             self._explain(name, {d.best[0] for d in glimpses}, self.gone & set(missing))
         for detection in glimpses:
@@ -182,8 +187,8 @@ class Tracker:
 
     # -- one look -----------------------------------------------------------------------------------------
 
-    def _associate(self, detections: Sequence[Detection]) -> dict[str, int]:
-        """Which detection is which thing: the likeliest assignment of all of them together."""
+    def associate(self, detections: Sequence[Detection]) -> dict[str, int]:
+        """Which detection (its index) is which thing: the likeliest assignment of all of them together."""
         told = [index for index, detection in enumerate(detections) if not detection.glimpse]
         names = sorted({name for index in told for name in detections[index].candidates})
         if not names:

@@ -140,11 +140,15 @@ def test_what_a_hand_lets_go_of_is_not_believed_to_float(kitchen: DrakeEnvironme
 
 def test_memory_is_saved_with_the_rest(kitchen: DrakeEnvironment) -> None:
     put_somewhere(kitchen, "Ham", -0.302, 0.001, kitchen.world.height("Bun-bottom"))
-    before = kitchen.observe()
+    before, picture = kitchen.observe(), kitchen.robot.perception.picture()
     saved = json.loads(json.dumps(kitchen.save()))
     other = DrakeEnvironment(load_domain("sandwich"), load_scene("kitchen"))
     assert other.restore(saved) == before
     assert json.dumps(other.save()) == json.dumps(saved)
+    again = other.robot.perception.picture()  # at once, before any time has passed
+    assert picture is not None
+    assert again is not None
+    assert np.array_equal(again, picture)
 
 
 @pytest.mark.parametrize("seed", [2, 3])
