@@ -5,8 +5,9 @@
 The parts are the action's own distribution (a Dirichlet estimate), the hierarchical softmax and the ensemble
 of tree CPDs. The weights are found by expectation-maximisation on predictions for trials that the parts have
 not seen: folds of the training trials, by object where there are enough of them, for it is new things that
-the robot asks about. So is one exponent per action, which makes the distributions as sure as they are right,
-and the dependence between the two effects.
+the robot asks about. Each action has weights of its own, drawn towards those of all: whether a pull works
+hangs on the tool, whether a push does hardly. So is found one exponent per action, which makes the
+distributions as sure as they are right, and the dependence between the two effects.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ MOST_ROWS = 4000
 TREES_FOR_WEIGHTS = 24
 EXPONENT_WIDTH = 0.5
 """Prior standard deviation of the logarithm of an exponent."""
+SHARED_WEIGHTS = 20.0
+"""Trials that the weights found for all actions count as in those of each."""
 PLACES = 48
 """Places kept to average over where the place is not told."""
 
@@ -58,8 +61,8 @@ class ActionCPD:
 
 @dataclass(eq=False)
 class MixtureModel:
-    """`weights` (3,) of the parts, `exponents` (actions,) (sharper above 1), `ratio` (actions, 5, 5) the
-    dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
+    """`weights` (actions, 3) of the parts, `exponents` (actions,) (sharper above 1), `ratio` (actions, 5, 5)
+    the dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
 
     action: ActionCPD
     softmax: SoftmaxCPD
@@ -80,8 +83,8 @@ class MixtureModel:
             table = table.take(np.sort(rng.choice(len(table), MOST_ROWS, replace=False)))
         parts = _fit_parts(table, rng)
         held_out = _held_out(table, rng, parts[1])
-        weights = _weights(held_out, table.bins)
-        mixed = np.einsum("k,knxb->nxb", weights, held_out)
+        weights = _weights_by_action(held_out, table)
+        mixed = _mixed(held_out, weights, table)
         exponents = _exponents(mixed, table)
         ratio = coupling(_sharpened(mixed, exponents[table.action]), table)
         places = table.start[np.isfinite(table.start).all(axis=1)]
@@ -107,7 +110,7 @@ class MixtureModel:
 
     def _joint(self, table: TrialTable) -> Floats:
         each = _marginals((self.action, self.softmax, self.forest), table)
-        mixed = _sharpened(np.einsum("k,knxb->nxb", self.weights, each), self.exponents[table.action])
+        mixed = _sharpened(_mixed(each, self.weights, table), self.exponents[table.action])
         return coupled(mixed, self.ratio[table.action])
 
     def update(self, table: TrialTable, rng: np.random.Generator) -> None:
@@ -137,7 +140,7 @@ class MixtureModel:
             ActionCPD(np.array(data["action"])),
             SoftmaxCPD.from_json(data["softmax"]),
             ForestCPD.from_json(data["forest"]),
-            np.array(data["weights"]),
+            np.broadcast_to(np.array(data["weights"], dtype=np.float64), (len(ACTIONS), 3)),
             np.array(data["exponents"]),
             np.array(data["ratio"]),
             np.array(data["places"]).reshape(-1, 2),
@@ -189,16 +192,35 @@ def _held_out(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD) ->
     return answer
 
 
-def _weights(held_out: Floats, bins: Ints, steps: int = 100) -> Floats:
-    """Weights of the mixture by expectation-maximisation, with one pseudo-trial for each part."""
+def _mixed(each: Floats, weights: Floats, table: TrialTable) -> Floats:
+    """Predictions (3, n, 2, 5) of the parts, weighted as each row's action has it, (n, 2, 5)."""
+    mixed: Floats = np.einsum("nk,knxb->nxb", weights[table.action], each)
+    return mixed
+
+
+def _weights_by_action(held_out: Floats, table: TrialTable) -> Floats:
+    """Weights of the mixture, (actions, 3): those of all trials count as `SHARED_WEIGHTS` trials of each."""
+    parts = len(held_out)
+    overall = _weights(held_out, table.bins, np.ones(parts))
+    prior = overall * SHARED_WEIGHTS
+    return np.stack(
+        [
+            _weights(held_out[:, table.action == action], table.bins[table.action == action], prior)
+            for action in range(len(ACTIONS))
+        ]
+    )
+
+
+def _weights(held_out: Floats, bins: Ints, prior: Floats, steps: int = 100) -> Floats:
+    """Weights of the mixture by expectation-maximisation, (3,); `prior` (3,) counts like trials."""
     rows = np.arange(len(bins))
     likelihood = np.stack([held_out[:, rows, axis, bins[:, axis]] for axis in range(2)], axis=2).reshape(
         len(held_out), -1
     )
-    weights = np.full(len(held_out), 1 / len(held_out))
+    weights = prior / prior.sum()
     for _ in range(steps):
         joint = weights[:, None] * likelihood
-        weights = (joint / joint.sum(axis=0)).sum(axis=1) + 1.0
+        weights = (joint / joint.sum(axis=0)).sum(axis=1) + prior
         weights /= weights.sum()
     return weights
 

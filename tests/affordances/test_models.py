@@ -165,3 +165,17 @@ def test_baselines_are_models() -> None:
     assert set(BASELINES) < set(MODELS)
     with pytest.raises(AffordanceError, match="unknown model 'best'"):
         Affordances.learn(synthetic_trials(40), "best", RNG(0))
+
+
+def test_each_action_weighs_for_itself_what_matters_to_it() -> None:
+    """Where three actions out of four do the same with every tool, pulls must not be taken for such, too."""
+    table = synthetic_trials(1200, seed=3)
+    others = table.action != action_index("pull")
+    effect = np.where(others[:, None], table.effect.mean(axis=0), table.effect)
+    same = replace(table, effect=effect)
+    model = MODELS["default"].fit(same, RNG(0))
+    pulls = same.take(~others)
+    closer = model.joint(pulls)[:, 3:].sum(axis=(1, 2))
+    for tool in ("stick", "hook", "rake"):
+        mine = pulls.manipulator == tool
+        assert closer[mine].mean() == pytest.approx((pulls.effect[mine, 0] > 0.025).mean(), abs=0.2), tool
