@@ -7,9 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from cognitive_arch.execution.beliefs import Belief, beliefs
 from cognitive_arch.execution.environment import Environment, FailureReason, Outcome, SkillResult
 from cognitive_arch.execution.episode import CycleSettings, CycleState, EpisodeResult, Step
 from cognitive_arch.execution.explain import EndReason, absent_entities, explain_failure
+from cognitive_arch.execution.grounding import Grounding, RuleGrounding
 from cognitive_arch.execution.heuristics import (
     Adaptation,
     Event,
@@ -22,7 +24,7 @@ from cognitive_arch.execution.reliability import Reliability
 from cognitive_arch.execution.weighing import Weighing, priors
 from cognitive_arch.outside import Happening, OutsideEvent, Schedule, told
 from cognitive_arch.planning.base import Planner, PlanResult
-from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
+from cognitive_arch.relational.rules import GroundRule, RuleSet
 from cognitive_arch.relational.symbols import Goal, GroundAction, State, satisfied
 from cognitive_arch.relational.transition import covering_rule
 from cognitive_arch.world.anchoring import WorldModel
@@ -31,7 +33,10 @@ from cognitive_arch.world.state import WorldState
 
 
 class PlanningCycle:
-    """Drives an environment through a list of sub-goals; `outside` is what happens to it meanwhile."""
+    """Drives an environment through a list of sub-goals; `outside` is what happens to it meanwhile.
+
+    `grounding` gives the rules over what is there; without one they are `rules` with their own numbers.
+    """
 
     def __init__(
         self,
@@ -44,20 +49,20 @@ class PlanningCycle:
         heuristics: Heuristics = Heuristics(),
         settings: CycleSettings = CycleSettings(),
         outside: Iterable[OutsideEvent] = (),
+        grounding: Grounding | None = None,
         on_act: Callable[[GroundAction], None] = lambda action: None,
         on_step: Callable[[Step], None] = lambda step: None,
     ) -> None:
         self._environment = environment
         self._world = world
         self._planner = planner
-        self._rules = rules
+        self._grounding = grounding or RuleGrounding(rules, environment.skills)
         self._rng = rng
         self._heuristics = heuristics
         self._settings = settings
         self._outside = tuple(outside)
         self._on_act = on_act
         self._on_step = on_step
-        self._grounded: dict[tuple[Entity, ...], tuple[GroundRule, ...]] = {}
 
     def run(
         self, goals: Sequence[Goal], observation: Observation, alternatives: Sequence[Sequence[Goal]] = ()
@@ -72,7 +77,7 @@ class PlanningCycle:
             Schedule(self._outside),
             Reliability(self._settings.reliability),
         )
-        self._world.update(observation)
+        self._world.update(self._grounding.perceive(observation))
         return self._work(goals, alternatives)
 
     def resume(
@@ -104,7 +109,7 @@ class PlanningCycle:
         so_far, state.events = state.events, []
         self._on_act(action)
         result = self._slip(action, self._environment.execute(action))
-        after = self._world.update(self._environment.observe())
+        after = self._look()
         worked = self._judge(action, before, after)
         state.total, state.good = state.total + 1, state.good + worked
         step = self._step(state.total, so_far, before, plan, result, worked, after)
@@ -123,7 +128,7 @@ class PlanningCycle:
     def _lasts(self) -> bool:
         """Look again after a while: what holds for a moment only (a stack that topples) is not reached."""
         self._environment.settle(self._settings.confirm_seconds)
-        state = self._world.update(self._environment.observe()).atoms()
+        state = self._look().atoms()
         lost = [str(literal) for literal in self._goal if not literal.holds(state)]
         if lost:
             self._tell(EventKind.GOAL_LOST, f"{', '.join(lost)} did not last")
@@ -155,7 +160,7 @@ class PlanningCycle:
     def _meddle(self) -> WorldState:
         """Let others meddle before the next action, and look again if anything changed."""
         if self._happen(self.state.total + 1, tuple(Happening)):
-            return self._world.update(self._environment.observe())
+            return self._look()
         return self._world.state
 
     def _happen(self, step: int, kinds: Collection[Happening]) -> set[str]:
@@ -261,11 +266,12 @@ class PlanningCycle:
 
     # -- learning from what happened ----------------------------------------------------------------
 
-    def _ground(self, state: WorldState) -> tuple[GroundRule, ...]:
-        """The rules over what is there now; grounding again only when that changed."""
-        if state.entities not in self._grounded:
-            self._grounded = {state.entities: self._rules.ground(state.entities, self._environment.skills)}
-        return self._grounded[state.entities]
+    def _look(self) -> WorldState:
+        """The world as it is now, with what its things are believed to be good for."""
+        return self._world.update(self._grounding.perceive(self._environment.observe()))
+
+    def _ground(self, state: WorldState) -> Sequence[GroundRule]:
+        return self._grounding.ground(state).rules
 
     def _learn(
         self, action: GroundAction, worked: bool, reason: FailureReason, rules: Sequence[GroundRule]
@@ -313,7 +319,15 @@ class PlanningCycle:
             reason=reason,
             effect=dict(sorted(result.effect.items())) if result else {},
             after=after,
+            probabilities=self._beliefs(plan, before),
         )
+
+    def _beliefs(self, plan: PlanResult | None, world: WorldState) -> tuple[Belief, ...]:
+        """What the plan was made with: to be told before the robot learns from what came of it."""
+        if plan is None:
+            return ()
+        reliability = self.state.reliability if self._heuristics.reliability else None
+        return beliefs(plan.actions, self._grounding.ground(world), self.state.adaptation, reliability)
 
     def _result(self, end: EndReason, world: WorldState) -> EpisodeResult:
         state, report = self.state, None

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from cognitive_arch.execution.beliefs import Belief
 from cognitive_arch.execution.environment import FailureReason, Outcome
 from cognitive_arch.execution.explain import EndReason, FailureReport
 from cognitive_arch.execution.heuristics import Adaptation, Event, EventKind
@@ -36,7 +37,8 @@ class Step:
     """One pass of the cycle: what was true, what was decided and why, what came of it.
 
     `before` and `after` are the world states around the action (the same one if nothing was done);
-    `subgoal` counts from 1. `outcome` is judged from the observation after the action.
+    `subgoal` counts from 1. `outcome` is judged from the observation after the action. `probabilities` are
+    those of the plan's actions, and of what else they were weighed against.
     """
 
     number: int
@@ -51,6 +53,7 @@ class Step:
     reason: FailureReason
     effect: dict[str, float]
     after: WorldState
+    probabilities: tuple[Belief, ...] = ()
 
     @property
     def change(self) -> StateChange:

@@ -42,6 +42,10 @@ def step_record(step: Step, misbelief: StateChange | None = None) -> dict[str, A
             "value": step.plan.value,
             "goal_probability": step.plan.goal_probability,
         },
+        "probabilities": [
+            {"action": str(belief.action), "p": round(belief.probability, 6), "from": belief.source}
+            for belief in step.probabilities
+        ],
         "action": step.action.name if step.action else None,
         "args": list(step.action.args) if step.action else [],
         "outcome": str(step.outcome) if step.outcome else None,
