@@ -52,6 +52,14 @@ PerceptionOption = Annotated[
         help="How the robot knows its table: camera (drake's own way) or oracle (the simulation tells)."
     ),
 ]
+AffordancesOption = Annotated[
+    str | None,
+    typer.Option(
+        metavar="SOURCE",
+        help="What the robot knows tools are good for: learned (from their shapes), default (the rules' own "
+        "numbers), none (any tool may pull), or FILE.json of cogarch learn networks.",
+    ),
+]
 EventOption = Annotated[
     list[str],
     typer.Option(
@@ -125,6 +133,7 @@ def run(
         ),
     ] = None,
     perception: PerceptionOption = None,
+    affordances: AffordancesOption = None,
     rules: RulesOption = None,
     event: EventOption = [],  # noqa: B006 (typer wants a list)
     store: StoreOption = Path("runs"),
@@ -156,6 +165,7 @@ def run(
         jitter=jitter,
         reach=reach,
         perception=perception,
+        affordances=affordances,
         rules=rules,
         record=record,
         video=video,

@@ -35,6 +35,7 @@ class Demo(BaseModel):
     noise: str = "0"
     heuristics: str = "all"
     jitter: float = 0.0
+    affordances: str | None = None
     events: tuple[Annotated[OutsideEvent, BeforeValidator(event_from_text)], ...] = ()
     succeeds: bool = True
 
@@ -57,6 +58,7 @@ class Demo(BaseModel):
             record=record,
             video=video,
             perception=perception,
+            affordances=self.affordances,
             events=self.events,
         )
 
@@ -68,6 +70,7 @@ class Demo(BaseModel):
             ("--heuristics", self.heuristics, "all"),
             ("--jitter", self.jitter, 0.0),
             ("--seed", config.seed, 0),
+            ("--affordances", self.affordances, None),
         ):
             words += [] if value == default else [option, str(value)]
         for event in self.events:

@@ -36,20 +36,25 @@ Name = Annotated[str, Field(pattern=r"^[A-Z][A-Za-z0-9]*(-[A-Za-z0-9]+)*$")]
 
 
 class ObjectSpec(Frozen):
-    """A thing the domain knows."""
+    """A thing the domain knows. `can_pull` is what is known of a tool, None if nobody told."""
 
     kind: Literal["object", "tool"] = "object"
     aliases: tuple[str, ...] = ()
     shape: Shape
     mass: Annotated[float, Field(gt=0, le=5)]
     color: tuple[float, float, float]
-    can_pull: bool = False
+    can_pull: bool | None = None
 
     @model_validator(mode="after")
     def _tools_have_a_shaft(self) -> ObjectSpec:
         if self.kind == "tool" and self.shape.type != "tool":
             raise ValueError(f"a thing of kind tool needs a shape of type tool, this is a {self.shape.type}")
         return self
+
+    @property
+    def may_pull(self) -> bool:
+        """Whether it is a tool of which it is not known that it cannot pull."""
+        return self.kind == "tool" and self.can_pull is not False
 
 
 class Recipe(Frozen):
@@ -78,6 +83,10 @@ class Domain(Frozen):
                 if name not in self.objects:
                     raise ValueError(unknown("object in a recipe", name, self.objects))
         return self
+
+    def with_strangers(self, strangers: Mapping[str, ObjectSpec]) -> Domain:
+        """The domain and things besides, which only one scene has; itself if there are none."""
+        return self.model_copy(update={"objects": {**self.objects, **strangers}}) if strangers else self
 
     @property
     def folder(self) -> Path:
@@ -153,7 +162,10 @@ def event_from_text(value: object) -> OutsideEvent:
 
 
 class Scene(Frozen):
-    """One `scenes/*.yaml`: which objects lie where when an episode starts, and what happens meanwhile."""
+    """One `scenes/*.yaml`: which objects lie where when an episode starts, and what happens meanwhile.
+
+    `strangers` are things of which the domain knows nothing: they have a shape, and no more.
+    """
 
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_.-]{0,59}$")]
     title: str = ""
@@ -161,6 +173,7 @@ class Scene(Frozen):
     table: Table = Table()
     reach: ReachLimits = ReachLimits()
     objects: dict[Name, Placement] = Field(min_length=1)
+    strangers: dict[Name, ObjectSpec] = Field(default_factory=dict, max_length=20)
     events: tuple[Annotated[OutsideEvent, BeforeValidator(event_from_text)], ...] = Field(
         default=(), max_length=100
     )

@@ -68,6 +68,11 @@ def tool_footprint(shape: ToolShape, centre: Point, yaw: float) -> tuple[Capsule
     return (shaft, Capsule(at(width - half, low + width), at(width - half, high - width), width))
 
 
+def gets_behind(tool: ToolShape, shape: Shape) -> bool:
+    """Whether the tool has a bar that gets behind the middle of a thing, the shaft beside it."""
+    return max(abs(side) for side in tool.sides) >= tool.width / 2 + outer_radius(shape)
+
+
 def _distance(first: Capsule, second: Capsule) -> float:
     a, b, c, d = first.a, first.b, second.a, second.b
     if _turn(a, b, c) * _turn(a, b, d) < 0 and _turn(c, d, a) * _turn(c, d, b) < 0:

@@ -74,6 +74,12 @@ def _run(run: Run, steps: list[dict[str, Any]], format_: str) -> View:
         f"planner {manifest['planner']}, heuristics {manifest['heuristics']}, noise {manifest['noise']}",
         "means        " + ", ".join(" ".join(triple) for triple in manifest["semantic"]),
     ]
+    if manifest.get("learned"):
+        learned = manifest["learned"]
+        lines.append(
+            f"learned      {learned['model']} model of {learned['trials']} trials ({learned['source']}), "
+            f"fingerprint {learned['fingerprint']}"
+        )
     if manifest.get("events"):
         lines.append("outside      " + ", ".join(manifest["events"]))
     lines += [f"sub-goal {n}   {', '.join(goal)}" for n, goal in enumerate(manifest["subgoals"], 1)]

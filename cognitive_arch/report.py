@@ -48,6 +48,7 @@ def step_text(record: dict[str, Any]) -> str:
             f"plan of {len(plan['actions'])}, probability {plan['goal_probability']:.2f}, "
             f"value {plan['value']:.2f}, horizon {record['horizon']}"
         )
+        lines += _believed(record.get("probabilities", ()))
         change = _brief("+", record["added"]) + _brief("-", record["removed"])
         lines.append("        " + (" ".join(change) or "nothing changed"))
         wrong = record.get("misbelief") or {"wrong": [], "overlooked": []}
@@ -64,6 +65,15 @@ def _events(events: Sequence[dict[str, str]]) -> list[str]:
         f"        {event['kind']}: {event['why']}"
         for event, following in zip(events, kinds[1:], strict=True)
         if not event["kind"] == following == "horizon_extended"
+    ]
+
+
+def _believed(probabilities: Sequence[dict[str, Any]]) -> list[str]:
+    """One line per number that is not that of the rule itself."""
+    return [
+        f"        believed: {belief['action']} works with {belief['p']:.2f}, from {belief['from']}"
+        for belief in probabilities
+        if belief["from"] != "default"
     ]
 
 

@@ -29,6 +29,11 @@ def domains_dir() -> Path:
     return data_root() / "domains"
 
 
+def learned_affordances() -> Path:
+    """What comes with the project of what was learned about tools and hands."""
+    return Path(__file__).resolve().parent / "affordances" / "data" / "learned.json"
+
+
 def grammar_text(name: str) -> str:
     """Text of `grammar/<name>.lark`."""
     return (data_root() / "grammar" / f"{name}.lark").read_text(encoding="utf-8")

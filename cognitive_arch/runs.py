@@ -10,9 +10,16 @@ from pathlib import Path
 from typing import Any
 
 from cognitive_arch.errors import BackendError, StoreError
-from cognitive_arch.execution.backends import BACKENDS, make_environment, perception_source, reach_model
+from cognitive_arch.execution.backends import (
+    BACKENDS,
+    affordance_source,
+    make_environment,
+    perception_source,
+    reach_model,
+)
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.episode import EpisodeResult, Step
+from cognitive_arch.execution.grounding import judge_of
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.metrics import speed
 from cognitive_arch.planning.compilation import warm_up, warm_up_search
@@ -51,6 +58,7 @@ def run_task(
     manifest = {"instruction": task.instruction, **config.to_json(), **task.to_json()}
     manifest |= {"events": [str(event) for event in setting.scene.events], "versions": versions()}
     manifest |= {"config": config.to_json(), "setting": setting.fingerprint()}
+    manifest |= {"learned": _learned(config)}
     with _prepared(task, config, setting) as environment, RunStore(store_folder, create=True) as store:
         started += _compile(config, progress)
         name = f"{setting.scene.name}-{config.backend}-{config.seed}"
@@ -96,7 +104,15 @@ def _as_begun(run: Run) -> tuple[RunConfig, Setting, Task]:
     setting = Setting.load(config.scene, config.rules, config.events)
     if setting.fingerprint() != run.manifest["setting"]:
         raise StoreError(f"scene, domain or rules have changed since run {run.run_id} was begun: {again}")
+    if _learned(config) != run.manifest.get("learned"):
+        raise StoreError(f"what was learned of tools has changed since run {run.run_id} was begun: {again}")
     return config, setting, setting.understand(run.manifest["instruction"])
+
+
+def _learned(config: RunConfig) -> dict[str, object] | None:
+    """What the robot has learned of tools and uses, for the manifest."""
+    judge = judge_of(affordance_source(config.affordances))
+    return None if judge is None else judge.told()
 
 
 @contextmanager
@@ -112,6 +128,7 @@ def _prepared(task: Task, config: RunConfig, setting: Setting) -> Iterator[Envir
         video=config.video,
         reach=config.reach,
         perception=config.perception,
+        shapes_seen=judge_of(affordance_source(config.affordances)) is not None,
     )
     try:
         _check_skills(task, config.backend, environment)
@@ -195,6 +212,7 @@ class _Episode:
             "noise": str(self.config.noise),
             "reach": reach_model(self.config.backend, self.config.reach),
             "perception": perception_source(self.config.backend, self.config.perception),
+            "affordances": affordance_source(self.config.affordances),
             "physical_noise": list(self.environment.noise_told),
             "events": [str(event) for event in self.setting.scene.events],
             **outcome,

@@ -7,7 +7,7 @@ from pathlib import Path
 from pydantic import ValidationError
 
 from cognitive_arch import random_scenes, resources
-from cognitive_arch.domain import Scene, explain_invalid, load_domain, read_yaml
+from cognitive_arch.domain import Domain, Scene, explain_invalid, load_domain, read_yaml
 from cognitive_arch.errors import ConfigError, unknown
 from cognitive_arch.outside import check_events
 
@@ -40,7 +40,11 @@ def load_scene(name_or_path: str) -> Scene:
         scene = Scene.model_validate(read_yaml(path, "scene"))
     except ValidationError as error:
         raise explain_invalid(error, path, Scene) from None
-    domain = load_domain(scene.domain)
+    known_before = load_domain(scene.domain).objects
+    for name in scene.strangers:
+        if name in known_before:
+            raise ConfigError(f"{path}: {name} is no stranger: domain {scene.domain} knows it")
+    domain = domain_of(scene)
     for name in scene.objects:
         if name not in domain.objects:
             raise ConfigError(f"{path}: {unknown('object', name, domain.objects)}")
@@ -49,3 +53,8 @@ def load_scene(name_or_path: str) -> Scene:
     except ConfigError as error:
         raise ConfigError(f"{path}: {error}") from None
     return scene
+
+
+def domain_of(scene: Scene) -> Domain:
+    """What is known in a scene: its domain, and what shapes its strangers have."""
+    return load_domain(scene.domain).with_strangers(scene.strangers)

@@ -10,12 +10,13 @@ from typing import Any
 
 import numpy as np
 
-from cognitive_arch.domain import Domain, Scene, load_domain
+from cognitive_arch.domain import Domain, Scene
 from cognitive_arch.errors import ConfigError, RuleError, one_line, unknown
-from cognitive_arch.execution.backends import BACKENDS, perception_source, reach_model
+from cognitive_arch.execution.backends import BACKENDS, affordance_source, perception_source, reach_model
 from cognitive_arch.execution.cycle import PlanningCycle
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.episode import CycleSettings, CycleState, EpisodeResult, Step
+from cognitive_arch.execution.grounding import make_grounding
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
@@ -28,7 +29,7 @@ from cognitive_arch.planning.registry import DEFAULT_PLANNER, make_planner
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, RuleSet
 from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction
-from cognitive_arch.scenes import load_scene, scene_paths
+from cognitive_arch.scenes import domain_of, load_scene, scene_paths
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS
 
@@ -80,7 +81,7 @@ class Setting:
         `events` happen besides those of the scene file.
         """
         loaded = load_scene(scene)
-        domain = load_domain(loaded.domain)
+        domain = domain_of(loaded)
         loaded = loaded.with_events(events, domain)
         path = domain.rules_path if rules is None else Path(rules)
         setting = cls(loaded, domain, load_rules(path))
@@ -143,11 +144,12 @@ class RunConfig:
     events: tuple[OutsideEvent, ...] = ()
     reach: str | None = None
     perception: str | None = None
+    affordances: str | None = None
     video: bool = False
 
     def __post_init__(self) -> None:
         # Files are found again wherever the run is gone on with.
-        for field in ("scene", "rules"):
+        for field in ("scene", "rules", "affordances"):
             name = getattr(self, field)
             if name is not None and Path(name).is_file() and name not in scene_paths():
                 object.__setattr__(self, field, str(Path(name).absolute()))
@@ -159,6 +161,7 @@ class RunConfig:
             raise ConfigError(unknown("backend", self.backend, BACKENDS))
         reach_model(self.backend, self.reach)
         perception_source(self.backend, self.perception)
+        affordance_source(self.affordances)
         if self.video and not (self.record and self.backend == "drake"):
             raise ConfigError("a video needs physics and a recording: --backend drake, without --no-record")
         make_planner(self.planner)
@@ -170,6 +173,7 @@ class RunConfig:
             "heuristics": str(self.heuristics),
             "reach": reach_model(self.backend, self.reach),
             "perception": perception_source(self.backend, self.perception),
+            "affordances": affordance_source(self.affordances),
         }
         return asdict(self) | texts | {"events": [str(event) for event in self.events]}
 
@@ -217,6 +221,8 @@ class Session:
         self._observation = environment.reset(config.seed)
         self._world.update(self._observation)
         self._events = setting.scene.events
+        source = affordance_source(config.affordances)
+        self._grounding = make_grounding(source, setting.rules, environment.skills)
 
     @property
     def world(self) -> WorldModel:
@@ -277,6 +283,7 @@ class Session:
             heuristics=self._heuristics,
             settings=settings,
             outside=events,
+            grounding=self._grounding,
             on_act=progress.on_act,
             on_step=progress.on_step,
         )

@@ -15,7 +15,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cognitive_arch.domain import Domain, ReachLimits
-from cognitive_arch.footprint import outer_radius
+from cognitive_arch.footprint import gets_behind
+from cognitive_arch.perception.top_view import described
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 from sim.hands import HANDLE, SIDES, finger_names, hand_links
 from sim.kinematics import Kinematics
@@ -155,8 +156,7 @@ class Perception(ABC):
         """Whether the tool has a bar that gets behind the middle of the object, the shaft beside it."""
         shape = self._domain.objects[tool].shape
         assert shape.type == "tool"
-        beside = shape.width / 2 + outer_radius(self._domain.objects[name].shape)
-        return max(abs(side) for side in shape.sides) >= beside
+        return gets_behind(shape, self._domain.objects[name].shape)
 
     def _describe(self, name: str, holder: str | None, visible: bool) -> ObjectObservation:
         x, y, z = (float(v) for v in self.pose(name).translation())
@@ -222,6 +222,10 @@ class OraclePerception(Perception):
 
     def on_table(self, name: str) -> bool:
         return ("table", name) in self._world.contacts()
+
+    def descriptors(self, name: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
+        """See `Perception.descriptors`: those of its shape as seen from above."""
+        return described(self._domain.objects[name].shape)
 
     def feels(self, what: str, name: str) -> bool:
         links = hand_links(SIDES[what]) if what in SIDES else {what}

@@ -19,6 +19,7 @@ from cognitive_arch.perception.descriptors import describe
 from cognitive_arch.perception.overlay import draw
 from cognitive_arch.perception.pose import outline_distance
 from cognitive_arch.perception.scene import Classify, SceneView, Sighting, sightings
+from cognitive_arch.perception.top_view import top_view, vectors
 from cognitive_arch.shapes import Shape
 from cognitive_arch.world.observation import HANDS
 from cognitive_arch.world.tracking import Candidate, Detection, HandSense, Place, Pose, Tracker
@@ -83,8 +84,10 @@ class CameraPerception(Perception):
             )
         glimpsed = {index: one.best[0] for index, one in enumerate(detections) if one.telling}
         self._names = glimpsed | {index: name for name, index in found.items()}
+        held = {self._tracker.held(hand) for hand in HANDS}
         for name, index in found.items():
-            if self.sightings[index].whole:
+            # In a hand a thing shows another side, and its lower half may not be the handle any more.
+            if self.sightings[index].whole and name not in held:
                 self._descriptors[name] = _described(self.sightings[index])
 
     def _senses(self) -> dict[str, HandSense]:
@@ -192,9 +195,7 @@ def _detection(sighting: Sighting) -> Detection:
 
 
 def _described(sighting: Sighting) -> tuple[tuple[float, ...], tuple[float, ...]]:
-    found = describe(sighting.region.mask)
-    desc, tooldesc = (found.vector(parts) for parts in (("whole",), ("top", "bottom")))
-    return tuple(map(float, desc)), tuple(map(float, tooldesc))
+    return vectors(describe(top_view(sighting.region.mask, sighting.region.surface)))
 
 
 def _judge(image: EyeImage, shape: Shape, X_WO: Pose) -> Place:

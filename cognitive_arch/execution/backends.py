@@ -23,6 +23,20 @@ PERCEPTIONS: Mapping[str, tuple[str, ...]] = {  # how the robot knows what is wh
     "symbolic": ("oracle",),
 }
 
+AFFORDANCES = ("learned", "default", "none")
+"""Where the robot knows from what tools are good for: what was learned of shapes; the domain's rules, and the
+environment for which tool pulls; or nowhere, so that any tool may pull, at the rules' own numbers."""
+
+
+def affordance_source(asked: str | None = None) -> str:
+    """One of `AFFORDANCES`, or the file of a model of one's own (.json). Raises `ConfigError`."""
+    if asked is None:
+        return "default"
+    if asked not in AFFORDANCES and not asked.endswith(".json"):
+        known = unknown("source of affordances", asked, AFFORDANCES)
+        raise ConfigError(f"{known}, or the file of `cogarch learn networks` (.json)")
+    return asked
+
 
 def reach_model(backend: str, asked: str | None = None) -> str:
     """How reach is told: `kinematic` by solving for the arms' joints, `published` by the constants of the
@@ -62,12 +76,14 @@ def make_environment(
     reach: str | None = None,
     perception: str | None = None,
     quiet_release: bool = False,
+    shapes_seen: bool = False,
 ) -> Environment:
     """An environment for one scene; raises `BackendError` for an unknown or unusable one.
 
     `rules` are the truth of the symbolic world; physics needs none. `record` keeps pictures and
     what else `save_artifacts` finishes, with `video` a video, too. `reach` and `perception` are among the
-    backend's `REACH_MODELS` and `PERCEPTIONS`. `quiet_release` is for the symbolic one (see there).
+    backend's `REACH_MODELS` and `PERCEPTIONS`. `quiet_release` and `shapes_seen` are for the symbolic one
+    (see there).
     """
     if backend not in BACKENDS:
         raise BackendError(unknown("backend", backend, BACKENDS))
@@ -75,7 +91,7 @@ def make_environment(
     if backend == "symbolic":
         from cognitive_arch.execution.symbolic import SymbolicEnvironment
 
-        return SymbolicEnvironment(domain, scene, rules, noise, jitter, quiet_release)
+        return SymbolicEnvironment(domain, scene, rules, noise, jitter, quiet_release, shapes_seen)
     module = drake_module("sim.environment")
     environment: Environment = module.DrakeEnvironment(
         domain,

@@ -8,10 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from pathlib import Path
 from typing import TYPE_CHECKING, Protocol
 
 from cognitive_arch.relational.rules import Entity, GroundRule, GroundRules, RuleSet, derived_of
 from cognitive_arch.relational.symbols import GroundAction
+from cognitive_arch.resources import learned_affordances
 from cognitive_arch.world.observation import HANDS, ObjectObservation, Observation
 from cognitive_arch.world.state import ObjectEntity, WorldState
 
@@ -150,6 +153,35 @@ def _numbered(
         return rule
     others = sum(outcome.probability for outcome in rule.outcomes[1:])
     return rule.with_first_probability(min(chances[asked[rule.action]], 1.0 - others))
+
+
+def make_grounding(source: str, rules: RuleSet, skills: frozenset[str]) -> Grounding:
+    """The grounding for one of `backends.AFFORDANCES`, or for a file with a model. Raises
+    `AffordanceError` for a file that is none."""
+    judge = judge_of(source)
+    if judge is not None:
+        return AffordanceGrounding(rules, skills, judge)
+    return UntoldGrounding(rules, skills) if source == "none" else RuleGrounding(rules, skills)
+
+
+def judge_of(source: str) -> Judge | None:
+    """What was learned, if `source` says to use it. Raises `AffordanceError`."""
+    if source in ("default", "none"):
+        return None
+    path = learned_affordances() if source == "learned" else Path(source)
+    try:
+        changed = path.stat().st_mtime_ns
+    except OSError:
+        changed = 0  # to read it tells what is wrong
+    return _judge(path, changed)
+
+
+@lru_cache(maxsize=4)
+def _judge(path: Path, changed: int) -> Judge:
+    """The model in a file as it was when it was last `changed`."""
+    from cognitive_arch.affordances.judgement import Judge
+
+    return Judge.load(path)
 
 
 def _with_pullers(

@@ -20,10 +20,12 @@ from cognitive_arch.execution.environment import FailureReason, Outcome, SkillRe
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.execution.placing import Place, footprint, nearest_free
 from cognitive_arch.execution.saving import SavedState, restore_rng, restoring, save_rng
+from cognitive_arch.footprint import gets_behind
 from cognitive_arch.outside import Happening, OutsideEvent
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
 from cognitive_arch.relational.symbols import GroundAction, Literal, State, parse_literal
 from cognitive_arch.relational.transition import covering_rule
+from cognitive_arch.shapes import Shape, ToolShape
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 
@@ -59,7 +61,8 @@ class SymbolicEnvironment:
     """Implements `Environment`; `jitter` (metres) moves the objects at the start of each episode.
 
     With `quiet_release` an action whose rule empties a hand (put, drop) never fails by noise, as in the
-    published runs; the text has it as noisy as its arm.
+    published runs; the text has it as noisy as its arm. With `shapes_seen` observations hold shape
+    descriptors: those of the domain's shapes, seen from above.
     """
 
     domain: Domain
@@ -68,6 +71,7 @@ class SymbolicEnvironment:
     noise: NoiseLevels = NoiseLevels()
     jitter: float = 0.0
     quiet_release: bool = False
+    shapes_seen: bool = False
     _things: dict[str, _Thing] = field(default_factory=dict)
     _properties: frozenset[str] = frozenset()
     _steps: int = 0
@@ -265,7 +269,8 @@ class SymbolicEnvironment:
         tools: tuple[str, ...] = ()
         if self.scene.reach.with_tool(x):
             tools = tuple(t for t in self._things if self.domain.objects[t].kind == "tool" and t != name)
-        pullers = tuple(t for t in tools if self.domain.objects[t].can_pull)
+        pullers = tuple(t for t in tools if self._pulls(t, name))
+        desc, tooldesc = _described(spec.shape) if self.shapes_seen else ((), ())
         return ObjectObservation(
             name=name,
             kind=spec.kind,
@@ -274,7 +279,16 @@ class SymbolicEnvironment:
             reachable_with=(*hands, *tools),
             pullable_with=() if hands else pullers,
             yaw=thing.yaw,
+            desc=desc,
+            tooldesc=tooldesc,
         )
+
+    def _pulls(self, tool: str, name: str) -> bool:
+        """Whether the tool can pull the thing: as its domain says, or else by its shape."""
+        spec = self.domain.objects[tool]
+        if spec.can_pull is not None or not isinstance(spec.shape, ToolShape):
+            return bool(spec.can_pull)
+        return gets_behind(spec.shape, self.domain.objects[name].shape)
 
     # -- acting -------------------------------------------------------------------------------------
 
@@ -344,6 +358,13 @@ class SymbolicEnvironment:
             if free and place[0] <= -0.2 and hand in self.scene.reach.hands(*place):
                 return place
         return x0, y0
+
+
+def _described(shape: Shape) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Descriptors of the whole and of both halves; what draws shapes is loaded when it is needed."""
+    from cognitive_arch.perception.top_view import described
+
+    return described(shape)
 
 
 def releases(rule: GroundRule) -> bool:

@@ -104,7 +104,7 @@ class References:
         """A tool by name, or by "it" if that was one."""
         name = next(iter(self.pronoun(mention)), "") if mention.kind == "PRONOUN" else ""
         if not name:
-            pullers = [n for n in self.tools if self._domain.objects[n].can_pull]
+            pullers = [n for n in self.tools if self._domain.objects[n].may_pull]
             name = self.named(mention, prefer=pullers)
         if not self.is_tool(name):
             there = ", ".join(self.tools) or "none"

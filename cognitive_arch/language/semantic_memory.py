@@ -166,8 +166,8 @@ class _Expansion:
         if tool == command.obj:
             raise InstructionError(f"I cannot {action} {tool} with itself")
         specs = self._domain.objects
-        if action == "pull" and not specs[tool].can_pull:
-            able = [n for n in specs if n in self._scene and specs[n].can_pull and n != command.obj]
+        if action == "pull" and not specs[tool].may_pull:
+            able = [n for n in specs if n in self._scene and specs[n].may_pull and n != command.obj]
             other = f"the {able[0]} can" if able else "nothing here can"
             raise InstructionError(f"the {tool} cannot pull; {other}")
         subject = self._grasp(tool, command.hand)
@@ -179,7 +179,7 @@ class _Expansion:
         specs = self._domain.objects
         tools = [n for n, s in specs.items() if s.kind == "tool" and n in self._scene and n != obj]
         if action == "pull":
-            tools = [n for n in tools if specs[n].can_pull]
+            tools = [n for n in tools if specs[n].may_pull]
         if not tools:
             raise InstructionError(f"there is no tool in this scene to {action} {obj} with; {self.offer()}")
         return min(tools, key=lambda n: (n not in self._held, not specs[n].can_pull))

@@ -174,13 +174,28 @@ def _sighting(
     likely = dict(classify(view.color, region.mask))
     known = {name: p for name, p in likely.items() if name in shapes and p > POSSIBLE}
     unknown = 1.0 - sum(known.values())
+    hypotheses = _fitted(known, region, shapes)
+    # What the recogniser never learned is told by its shape alone, from what it calls unknown.
+    if unknown > POSSIBLE:
+        strangers = _fitted(dict.fromkeys(set(shapes) - set(likely), 1.0), region, shapes)
+        share = unknown / max(1.0, sum(fit.probability for fit in strangers.values()))
+        for name, fit in sorted(strangers.items()):
+            hypotheses[name] = Hypothesis(share * fit.probability, fit.estimate)
+            unknown -= share * fit.probability
+    return Sighting(region, hypotheses, max(unknown, POSSIBLE))
+
+
+def _fitted(
+    likely: Mapping[str, float], region: Region, shapes: Mapping[str, Shape]
+) -> dict[str, Hypothesis]:
+    """What the region would be as each of the things, each as `likely` beforehand as it looks."""
     hypotheses = {}
-    for name, probability in known.items():
+    for name, probability in likely.items():
         estimate = estimate_pose(shapes[name], region.surface, region.outline)
         if estimate is not None:
             fits = math.exp(-((estimate.residual / MISFIT) ** 2) / 2)
             hypotheses[name] = Hypothesis(probability * fits, estimate)
-    return Sighting(region, hypotheses, max(unknown, POSSIBLE))
+    return hypotheses
 
 
 def _joined(found: list[Sighting], view: SceneView, shapes: Mapping[str, Shape]) -> list[Sighting]:

@@ -9,12 +9,14 @@ upper half of a tool whose handle points to the robot is its effector half then.
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from cognitive_arch.errors import PerceptionError
+from cognitive_arch.perception.descriptors import Descriptions, describe
 from cognitive_arch.shapes import Box, Compound, Cylinder, Shape, Sphere, ToolShape
 
 Mask = NDArray[np.uint8]  # (h, w), 1 where the thing is
@@ -69,6 +71,21 @@ def silhouette(shape: Shape, yaw: float = 0.0) -> Mask:
         corners = np.rint((outline - low) / PIXEL).astype(np.int32) + BORDER
         cv2.fillConvexPoly(seen, np.ascontiguousarray(corners[:, ::-1]), 1)
     return seen
+
+
+Vectors = tuple[tuple[float, ...], tuple[float, ...]]
+
+
+def vectors(found: Descriptions) -> Vectors:
+    """Descriptors as the world state keeps them: of the whole; of the upper half, then of the lower."""
+    whole, halves = (found.vector(parts).tolist() for parts in (("whole",), ("top", "bottom")))
+    return tuple(whole), tuple(halves)
+
+
+@lru_cache(maxsize=256)
+def described(shape: Shape) -> Vectors:
+    """The descriptors of a thing of known shape, seen from above with its handle to the robot."""
+    return vectors(describe(silhouette(shape)))
 
 
 Outline = NDArray[np.float64]  # (n, 2), corners of a convex area, x and y in metres
