@@ -191,7 +191,7 @@ def test_a_damaged_checkpoint(tmp_path: Path, column: str, value: str, error: ty
 def test_a_configuration_is_read_as_it_was_written() -> None:
     how = CASES["events"][1]
     assert RunConfig.from_json(json.loads(json.dumps(how.to_json()))) == replace(
-        how, reach="published", perception="oracle"
+        how, reach="published", perception="oracle", affordances="default"
     )
     noisy = config(0, "left=0.12345678901234,push=1e-9")
     assert RunConfig.from_json(noisy.to_json()).noise == noisy.noise
