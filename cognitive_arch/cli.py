@@ -16,7 +16,7 @@ import typer
 
 from cognitive_arch import __version__
 from cognitive_arch.errors import CogArchError, ConfigError, one_line
-from cognitive_arch.verbs import learn, query, seeing, sweeps
+from cognitive_arch.verbs import explore, learn, query, seeing, sweeps
 from cognitive_arch.verbs.common import (
     Json,
     PlannerOption,
@@ -304,6 +304,7 @@ def inspect(
 
 query.register(app)
 sweeps.register(app)
+explore.register(app)
 app.add_typer(learn.app, name="learn")
 seeing.register(app)
 

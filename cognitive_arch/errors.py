@@ -54,6 +54,10 @@ class StoreError(CogArchError):
     """The run store cannot be opened, read or written."""
 
 
+class ExplorationError(CogArchError):
+    """An exploration, or the file it is to be kept in, is unusable."""
+
+
 class SweepError(CogArchError):
     """A sweep, or the folder it is to be kept in, is unusable."""
 

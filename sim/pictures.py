@@ -24,7 +24,7 @@ from cognitive_arch.perception.camera import Camera
 from cognitive_arch.runlog.trajectory import Trajectory
 from sim.eyes import EyePose
 from sim.rendering import Pixels, Renderer, look_from
-from sim.scenario import build_scenario
+from sim.scenario import Fixed, build_scenario
 
 LARGE, SMALL = (960, 720), (640, 480)  # pixels
 SIDE_FROM, SIDE_TO, SIDE_VIEW = (-1.12, 0.60, 0.46), (-0.17, 0.02, 0.05), 0.75  # m, m, rad
@@ -43,8 +43,10 @@ class View(StrEnum):
 class Stage:
     """A scene that stands still until it is told how it looks."""
 
-    def __init__(self, domain: Domain, scene: Scene, meshcat: Meshcat | None = None) -> None:
-        scenario = build_scenario(domain, scene)
+    def __init__(
+        self, domain: Domain, scene: Scene, meshcat: Meshcat | None = None, fixed: Fixed | None = None
+    ) -> None:
+        scenario = build_scenario(domain, scene, fixed=fixed)
         self.plant, graph = scenario.plant, scenario.scene_graph
         self._renderer = None if meshcat is not None else Renderer(graph)
         if meshcat is not None:

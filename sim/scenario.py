@@ -34,6 +34,7 @@ from pydrake.multibody.plant import (
     MultibodyPlant,
 )
 from pydrake.multibody.tree import (
+    BodyIndex,
     ModelInstanceIndex,
     PdControllerGains,
     RigidBody,
@@ -81,19 +82,32 @@ class Scenario:
     objects: Mapping[str, RigidBody]
 
 
-def build_scenario(domain: Domain, scene: Scene, *, friction: float = FRICTION) -> Scenario:
-    """Put robot, table and the scene's objects into one plant and finalise it."""
+Fixed = Mapping[str, tuple[str, RigidTransform]]
+"""Things that are fixed to a link of the robot, by name: the link and X_LO."""
+
+
+def build_scenario(
+    domain: Domain, scene: Scene, *, friction: float = FRICTION, fixed: Fixed | None = None
+) -> Scenario:
+    """Put robot, table and the scene's objects into one plant and finalise it.
+
+    What is `fixed` to the robot touches anything but that arm, and is none of the scenario's `objects`.
+    """
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlantSceneGraph(builder, TIME_STEP)
     plant.set_discrete_contact_approximation(DiscreteContactApproximation.kSap)
     plant.set_contact_model(ContactModel.kPoint)
     robot, table, objects = populate(plant, domain, scene, friction)
+    for name, (link, X_LO) in (fixed or {}).items():
+        plant.WeldFrames(plant.GetFrameByName(link), objects.pop(name).body_frame(), X_LO)
     _set_gains(plant)
     # The real arms compensate gravity in their controllers; the objects they carry still weigh.
     plant.set_gravity_enabled(robot, False)
     plant.Finalize()
     _let_robot_overlap_itself(plant, scene_graph, robot)
     _keep_upper_pads_from_pads(plant, scene_graph, robot, objects.values())
+    for name, (link, _) in (fixed or {}).items():
+        _let_arm_overlap(plant, scene_graph, name, link[:2])
     return Scenario(builder, plant, scene_graph, robot, table, objects)
 
 
@@ -349,3 +363,17 @@ def _keep_upper_pads_from_pads(
         lower.Add(plant.GetBodyFrameIdOrThrow(index))
     filters = scene_graph.collision_filter_manager()
     filters.Apply(CollisionFilterDeclaration().ExcludeWithin(upper).ExcludeBetween(upper, lower))
+
+
+def _let_arm_overlap(plant: MultibodyPlant, scene_graph: SceneGraph, name: str, arm: str) -> None:
+    """What is fixed to a hand lies between its fingers."""
+    own = GeometrySet()
+    for body in (plant.get_body(index) for index in _all_bodies(plant)):
+        if body.name().startswith(arm):
+            own.Add(plant.GetBodyFrameIdOrThrow(body.index()))
+    held = GeometrySet(plant.GetBodyFrameIdOrThrow(plant.GetBodyByName(name).index()))
+    scene_graph.collision_filter_manager().Apply(CollisionFilterDeclaration().ExcludeBetween(own, held))
+
+
+def _all_bodies(plant: MultibodyPlant) -> list[BodyIndex]:
+    return [BodyIndex(i) for i in range(plant.num_bodies())]

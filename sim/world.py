@@ -24,7 +24,7 @@ from sim.hands import (
     finger_names,
     knuckle_names,
 )
-from sim.scenario import FRICTION, Scenario, build_scenario, resist_rolling
+from sim.scenario import FRICTION, Fixed, Scenario, build_scenario, resist_rolling
 
 Joints = NDArray[np.float64]
 COMMAND_PERIOD = 0.02  # s between two set points of a motion
@@ -46,10 +46,12 @@ HOME: Mapping[str, float] = {  # rad; both hands beside the table's work area, w
 class World:
     """One episode's physics. Joint vectors list the actuated joints in the order of `joint_names`."""
 
-    def __init__(self, domain: Domain, scene: Scene, *, friction: float = FRICTION) -> None:
+    def __init__(
+        self, domain: Domain, scene: Scene, *, friction: float = FRICTION, fixed: Fixed | None = None
+    ) -> None:
         self.domain = domain
         self.scene = scene
-        self.scenario: Scenario = build_scenario(domain, scene, friction=friction)
+        self.scenario: Scenario = build_scenario(domain, scene, friction=friction, fixed=fixed)
         plant = self.plant = self.scenario.plant
         self.diagram = self.scenario.builder.Build()
         self.simulator = Simulator(self.diagram)
@@ -79,16 +81,18 @@ class World:
 
     # -- setting up ---------------------------------------------------------------------------------
 
-    def reset(self, placements: Mapping[str, Placement]) -> None:
-        """Robot at home, objects just above the table where `placements` says, everything at rest.
+    def reset(self, placements: Mapping[str, Placement], joints: Joints | None = None) -> None:
+        """Robot at home (or at `joints`, (n_joints,)), objects just above the table where `placements` says,
+        everything at rest.
 
         Objects without a placement are parked.
         """
+        start = self.home if joints is None else joints
         plant, context = self.plant, self._plant_context
         self._context.SetTime(0.0)
         self._seen_contacts = None
         positions = np.zeros(plant.num_positions())
-        positions[self._positions] = self.home
+        positions[self._positions] = start
         plant.SetPositions(context, positions)
         plant.SetVelocities(context, np.zeros(plant.num_velocities()))
         for name in self.scenario.objects:
@@ -99,8 +103,8 @@ class World:
             z = self.scene.table.height + self.height(name) / 2 + 0.0005
             self.place(name, RigidTransform(RollPitchYaw(0, 0, placements[name].yaw), [x, y, z]))
         self.on_send = None
-        self._send(self.home, np.zeros(len(self.home)))
-        self.command = self.home.copy()
+        self._send(start, np.zeros(len(start)))
+        self.command = start.copy()
         self.simulator.Initialize()
 
     def place(self, name: str, X_WO: RigidTransform) -> None:
@@ -173,6 +177,23 @@ class World:
             if np.linalg.norm(info.contact_force()) > 1e-4:
                 a, b = (self.plant.get_body(k).name() for k in (info.bodyA_index(), info.bodyB_index()))
                 pairs.update({(a, b), (b, a)})
+        return frozenset(pairs)
+
+    def overlaps(self) -> frozenset[tuple[str, str]]:
+        """Names of the bodies that are in each other's way as they stand now, each pair once.
+
+        Other than `contacts` this needs no time to pass.
+        """
+        graph = self.scenario.scene_graph
+        query = graph.get_query_output_port().Eval(graph.GetMyContextFromRoot(self._context))
+        inspector = query.inspector()
+        pairs = set()
+        for found in query.ComputePointPairPenetration():
+            bodies = [
+                self.plant.GetBodyFromFrameId(inspector.GetFrameId(g)) for g in (found.id_A, found.id_B)
+            ]
+            a, b = sorted(str(body.name()) for body in bodies if body is not None)
+            pairs.add((a, b))
         return frozenset(pairs)
 
     # -- keeping ------------------------------------------------------------------------------------
@@ -294,9 +315,14 @@ class World:
         if self._friction.get(hand, 1.0) == factor:
             return
         self._friction[hand] = factor
-        graph, friction = self.scenario.scene_graph, FINGER_FRICTION * factor
-        context = graph.GetMyMutableContextFromRoot(self._context)
         for name in finger_names(SIDES[hand]):
+            self.set_friction(name, friction=FINGER_FRICTION * factor)
+
+    def set_friction(self, *bodies: str, friction: float) -> None:
+        """Give bodies another coefficient of friction."""
+        graph = self.scenario.scene_graph
+        context = graph.GetMyMutableContextFromRoot(self._context)
+        for name in bodies:
             for geometry in self.plant.GetCollisionGeometriesForBody(self.plant.GetBodyByName(name)):
                 properties = ProximityProperties(graph.model_inspector().GetProximityProperties(geometry))
                 properties.UpdateProperty("material", "coulomb_friction", CoulombFriction(friction, friction))

@@ -29,11 +29,12 @@ SHOWN = ("scene", "backend", "planner", "vary", "heuristics", "noise")
 class Bar:
     """A progress bar with the time left, on stderr; where that is no terminal, a line every tenth."""
 
-    def __init__(self) -> None:
+    def __init__(self, what: str = "episodes") -> None:
+        self._what = what
         self._console = Console(stderr=True)
-        columns = (TextColumn("episodes"), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
+        columns = (TextColumn(what), BarColumn(), MofNCompleteColumn(), TimeElapsedColumn())
         self._progress = Progress(*columns, TextColumn("left:"), TimeRemainingColumn(), console=self._console)
-        self._task = self._progress.add_task("episodes", total=None, visible=False)
+        self._task = self._progress.add_task(what, total=None, visible=False)
         self._before: int | None = None
         self._told = 0
         self._started = time.monotonic()
@@ -50,21 +51,21 @@ class Bar:
             self._progress.stop()
 
     def update(self, done: int, total: int) -> None:
-        """`done` of `total` episodes there are; the first call says where it starts."""
+        """`done` of `total` there are; the first call says where it starts."""
         if self._before is None:
             self._before, self._told = done, 10 * done // max(total, 1)
             # Rows that were there already must not make it look quick.
             self._progress.reset(self._task, total=total - done, visible=True)
             self._started = time.monotonic()
             if done:
-                self.notice(f"{done} of {total} episodes are there already")
+                self.notice(f"{done} of {total} {self._what} are there already")
         self._progress.update(self._task, completed=done - self._before)
         tenth = 10 * done // max(total, 1)
         if not self._console.is_terminal and tenth > self._told:
             self._told = tenth
             spent = time.monotonic() - self._started
             left = spent * (total - done) / max(done - self._before, 1)
-            print(f"{done} of {total} episodes, {left:.0f} s left", file=sys.stderr, flush=True)
+            print(f"{done} of {total} {self._what}, {left:.0f} s left", file=sys.stderr, flush=True)
 
     def notice(self, text: str) -> None:
         """Something to know meanwhile."""

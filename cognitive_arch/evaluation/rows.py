@@ -10,7 +10,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, Any, NamedTuple
+from typing import IO, Any, NamedTuple, Protocol
 
 from cognitive_arch.errors import SweepError, one_line
 from cognitive_arch.evaluation.sweep import SweepConfig
@@ -63,15 +63,23 @@ def _text(value: object) -> str:
     )
 
 
+class Line(Protocol):
+    """Something that is a line of CSV."""
+
+    def line(self) -> str:
+        """With its end."""
+        ...
+
+
 class RowFile:
-    """`rows.csv` while a sweep goes on; `done` rows are in it. Others are kept from writing there."""
+    """A file of rows while work goes on; `done` rows are in it. Others are kept from writing there."""
 
     def __init__(self, file: IO[bytes], path: Path, done: int) -> None:
         self._file = file
         self._path = path
         self.done = done
 
-    def append(self, rows: Iterable[Row]) -> None:
+    def append(self, rows: Iterable[Line]) -> None:
         """Write rows and have them on the disk; raises `SweepError` if that fails (a full disk)."""
         lines = [row.line() for row in rows]
         start = self._file.seek(0, os.SEEK_END)
@@ -111,6 +119,16 @@ def open_rows(folder: Path, config: SweepConfig, command: str) -> Iterator[RowFi
         raise SweepError(f"cannot use {folder} as --out: {error.strerror}") from None
     _claim(folder, config, command)
     path = folder / ROWS
+    with locked(path) as file:
+        rows = RowFile(file, path, _mend(file, path, config))
+        if rows.done < config.total:
+            _check_versions(folder)
+        yield rows
+
+
+@contextmanager
+def locked(path: Path) -> Iterator[IO[bytes]]:
+    """The file, to read and to append to, other processes being kept from that; raises `SweepError`."""
     try:
         file = open(path, "a+b", buffering=0)  # noqa: SIM115 (closed below)
     except OSError as error:
@@ -122,10 +140,23 @@ def open_rows(folder: Path, config: SweepConfig, command: str) -> Iterator[RowFi
             raise SweepError(
                 f"another process is writing to {path}; wait for it or take another --out"
             ) from None
-        rows = RowFile(file, path, _mend(file, path, config))
-        if rows.done < config.total:
-            _check_versions(folder)
-        yield rows
+        yield file
+
+
+def whole_lines(file: IO[bytes], path: Path, header: str) -> list[str]:
+    """The lines of a file of rows, without what a kill left of the last; an empty one gets its header."""
+    file.seek(0)
+    content = file.read()
+    whole = content[: content.rfind(b"\n") + 1]
+    try:
+        if len(whole) < len(content):
+            os.ftruncate(file.fileno(), len(whole))
+        if not whole:
+            _write(file, header)
+    except OSError as error:
+        raise SweepError(f"cannot write {path}: {error.strerror}") from None
+    file.seek(0, os.SEEK_END)
+    return whole.decode("utf-8", "replace").splitlines()
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
@@ -194,18 +225,7 @@ def _brief(value: object) -> str:
 
 def _mend(file: IO[bytes], path: Path, config: SweepConfig) -> int:
     """Cut off what a kill left of a line; returns how many rows there are: these must come first."""
-    file.seek(0)
-    content = file.read()
-    whole = content[: content.rfind(b"\n") + 1]
-    try:
-        if len(whole) < len(content):
-            os.ftruncate(file.fileno(), len(whole))
-        if not whole:
-            _write(file, HEADER)
-    except OSError as error:
-        raise SweepError(f"cannot write {path}: {error.strerror}") from None
-    file.seek(0, os.SEEK_END)
-    lines = whole.decode("utf-8", "replace").splitlines()
+    lines = whole_lines(file, path, HEADER)
     if not lines:
         return 0
     foreign = SweepError(f"{path} has been changed by something else; take another --out")

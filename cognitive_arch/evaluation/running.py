@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
+from typing import Any, TypeVar
 
 from cognitive_arch.errors import SweepError, one_line
 from cognitive_arch.evaluation.episodes import run_job
@@ -29,6 +29,8 @@ PATIENCE_S = 5
 AHEAD = 4
 """Jobs per worker that a cluster is given beforehand."""
 
+T = TypeVar("T")
+R = TypeVar("R")
 Work = Callable[[Job], list[Row]]
 
 
@@ -78,14 +80,14 @@ def run_sweep(
                 rows.append(done)
                 on_rows(rows.done, total)
         except (KeyboardInterrupt, SystemError) as error:
-            if not _is_ctrl_c(error):
+            if not is_ctrl_c(error):
                 raise
             raise SweepInterrupted(rows.done, total) from None
         return rows.done - before
 
 
-def _is_ctrl_c(error: BaseException | None) -> bool:
-    """Ctrl-C in the midst of a compiled call comes out as the cause of a `SystemError`."""
+def is_ctrl_c(error: BaseException | None) -> bool:
+    """Whether it is one: Ctrl-C in the midst of a compiled call comes out as the cause of a `SystemError`."""
     while error is not None and not isinstance(error, KeyboardInterrupt):
         error = error.__cause__ or error.__context__
     return error is not None
@@ -94,10 +96,11 @@ def _is_ctrl_c(error: BaseException | None) -> bool:
 def _in_order(jobs: Iterable[Job], work: Work, n: int, client: Any) -> Iterator[list[Row]]:
     if client is not None:
         return _on_cluster(jobs, work, client)
-    return map(work, jobs) if n == 1 else _in_processes(jobs, work, n)
+    return map(work, jobs) if n == 1 else in_processes(jobs, work, n)
 
 
-def _in_processes(jobs: Iterable[Job], work: Work, n: int) -> Iterator[list[Row]]:
+def in_processes(jobs: Iterable[T], work: Callable[[T], R], n: int) -> Iterator[R]:
+    """What `work` makes of each job, in their order, the work shared among `n` processes."""
     from joblib import Parallel, delayed
 
     task = delayed(_single_threaded)
@@ -109,7 +112,7 @@ def _in_processes(jobs: Iterable[Job], work: Work, n: int) -> Iterator[list[Row]
         results.close()  # ends the processes, whatever they are at
 
 
-def _single_threaded(work: Work, job: Job) -> list[Row]:
+def _single_threaded(work: Callable[[T], R], job: T) -> R:
     """One process per core is enough: planners that share samples out among threads gain nothing here."""
     os.environ.setdefault("OMP_NUM_THREADS", "1")
     return work(job)

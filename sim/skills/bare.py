@@ -253,10 +253,10 @@ def _sweeps(
                 for turn in COURSES:
                     angle = towards + turn
                     held = stance(hand, robot.postures[hand], angle + heading + skew, pitch, roll)
-                    yield _sweep(held, body, (float(x), float(y)), height, angle, distance)
+                    yield aimed(held, body, (float(x), float(y)), height, angle, distance)
 
 
-def _sweep(
+def aimed(
     held: Stance, body: tuple[Capsule, ...], place: Point, height: float, angle: float, distance: float
 ) -> Sweep:
     course = (math.cos(angle), math.sin(angle))
