@@ -12,6 +12,8 @@ with the hand already beside the object, and a tool is fixed to the hand: grips 
 
 from __future__ import annotations
 
+import gc
+import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -64,7 +66,7 @@ TOOL_Y, HAND_Y = (-0.06, 0.26), (0.02, 0.28)  # m towards the side of the hand
 SETTLE, REST = 0.1, 0.5  # s before and after the movement
 PIECE = 0.03  # m between two waypoints
 DRAWS = 200
-HELD_OUT_SHARE = 690 / 2353  # of the trials, as in thesis Sec. 5.4.1.1
+HELD_OUT_CARDS = 3  # for one of every other object: 30 % of the trials, as in thesis Sec. 5.4.1.1
 
 
 @dataclass(frozen=True)
@@ -126,13 +128,14 @@ def _object(name: str, view: int) -> Descriptors:
     return descriptors_of(OBJECTS[name], view)
 
 
-def explore(kind: str, seed: int, number: int, picture: Path | None = None) -> Outcome:
-    """The trial `number` of those of `kind` (`hand` or `tool`) that `seed` leads to, by itself.
+def explore(kind: str, seed: int, block: int, place: int, picture: Path | None = None) -> Outcome:
+    """A trial of `kind` (`hand` or `tool`): that at `place` within a block of trials with the same things.
 
-    `picture` is where to keep a picture (PNG) of before and after.
+    What it is follows from `seed` and these numbers alone. `picture` is where to keep a picture (PNG) of
+    before and after.
     """
-    rng = np.random.default_rng([seed, number])
-    setup = draw_setup(kind, rng)
+    setup = draw_setup(kind, seed, block, place)
+    rng = np.random.default_rng([seed, len(kind), block, place])
     bench = Bench.of(setup.hand, setup.manipulator, setup.object)
     for draws in range(DRAWS):
         attempt = bench.draw(setup, rng)
@@ -145,16 +148,15 @@ def explore(kind: str, seed: int, number: int, picture: Path | None = None) -> O
     raise AssertionError(f"no place found for {setup}")
 
 
-def draw_setup(kind: str, rng: np.random.Generator) -> Setup:
-    """What to try."""
+def draw_setup(kind: str, seed: int, block: int, place: int) -> Setup:
+    """What to try: things as a shuffled pack of cards deals them to the blocks, actions in turn."""
     known = tuple(TOOLS) if kind == "tool" else tuple(posture.value for posture in Posture)
-    others = tuple(name for name in OBJECTS if name != HELD_OUT)
-    return Setup(
-        hand=HANDS[int(rng.integers(2))],
-        manipulator=known[int(rng.integers(len(known)))],
-        action=ACTIONS[int(rng.integers(4))],
-        object=HELD_OUT if rng.uniform() < HELD_OUT_SHARE else others[int(rng.integers(len(others)))],
-    )
+    objects = [*OBJECTS, *[HELD_OUT] * (HELD_OUT_CARDS - 1)]
+    cards = list(itertools.product(HANDS, known, objects))
+    pack, card = divmod(block, len(cards))
+    dealt = np.random.default_rng([seed, len(kind), pack]).permutation(len(cards))[card]
+    hand, manipulator, obj = cards[int(dealt)]
+    return Setup(hand, manipulator, ACTIONS[place % len(ACTIONS)], obj)
 
 
 class Bench:
@@ -177,9 +179,10 @@ class Bench:
         self._rest = self._at_rest()
 
     @staticmethod
-    @lru_cache(maxsize=256)
+    @lru_cache(maxsize=1)
     def of(hand: str, manipulator: str, obj: str) -> Bench:
-        """The bench for these, made once."""
+        """The bench for these; it is used until there is to be another."""
+        gc.collect()  # a world is few objects of many megabytes: the collector would wait too long
         return Bench(hand, manipulator, obj)
 
     def _at_rest(self) -> Joints:

@@ -9,11 +9,11 @@ from __future__ import annotations
 import csv
 import io
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from cognitive_arch.affordances.trials import EDGES, KINDS
 from cognitive_arch.errors import ExplorationError, one_line, unknown
@@ -22,10 +22,16 @@ from cognitive_arch.evaluation.running import in_processes, is_ctrl_c
 from cognitive_arch.perception.descriptors import DEFAULT, FORMULAS
 from cognitive_arch.runlog.records import versions
 
+if TYPE_CHECKING:
+    from sim.exploration import Outcome
+
 FORMAT = 1
 BOTH = "both"
-HANDS_OF_TEN = 3
-"""Of ten trials of both kinds, so many are with bare hands."""
+HAND_TURNS = (1, 4, 7)
+HANDS_OF_TEN = len(HAND_TURNS)
+"""Of ten blocks of both kinds, these are with bare hands."""
+BLOCK = 8
+"""Trials in a row with the same things: changing these costs as much as a trial."""
 MOST = 1_000_000
 _NAMES = FORMULAS[DEFAULT].names
 COLUMNS = (
@@ -66,9 +72,24 @@ class ExploreConfig:
 
     def kind_of(self, number: int) -> str:
         """Whether trial `number` is done with a hand or with a tool."""
+        return self.block_of(number)[0]
+
+    def block_of(self, number: int) -> tuple[str, int]:
+        """The kind of trial `number`, and which block of that kind it belongs to."""
+        block = number // BLOCK
         if self.kind != BOTH:
-            return self.kind
-        return "hand" if number % 10 < HANDS_OF_TEN else "tool"
+            return self.kind, block
+        # So that a part of the trials has both kinds, too, they take turns.
+        tens, place = divmod(block, 10)
+        hands = tens * HANDS_OF_TEN + sum(turn < place for turn in HAND_TURNS)
+        return ("hand", hands) if place in HAND_TURNS else ("tool", block - hands)
+
+    def blocks(self, done: int) -> Iterator[range]:
+        """Numbers of the trials to do, those of a block together."""
+        while done < self.trials:
+            end = min(self.trials, (done // BLOCK + 1) * BLOCK)
+            yield range(done, end)
+            done = end
 
     def identity(self) -> dict[str, Any]:
         """What must be the same to go on: more trials may be asked for later."""
@@ -125,11 +146,13 @@ def explore(
         rows = RowFile(file, out, _done(whole_lines(file, out, HEADER), config, out))
         before, total = rows.done, config.trials
         on_rows(before, total)
-        numbers = range(before, total)
-        work = partial(_trial, config, pictures=pictures)
+        work = partial(_trials, config, pictures=pictures)
+        blocks: Iterable[range] = config.blocks(before)
+        if jobs == 1:  # one by one, so that a kill costs one trial
+            blocks = (range(n, n + 1) for block in blocks for n in block)
         try:
-            for row in map(work, numbers) if jobs == 1 else in_processes(numbers, work, jobs):
-                rows.append([row])
+            for found in map(work, blocks) if jobs == 1 else in_processes(blocks, work, jobs):
+                rows.append([_row(number, outcome) for number, outcome in found])
                 on_rows(rows.done, total)
         except (KeyboardInterrupt, SystemError) as error:
             if not is_ctrl_c(error):
@@ -138,21 +161,27 @@ def explore(
         return max(0, rows.done - before)
 
 
-def _trial(config: ExploreConfig, number: int, pictures: Path | None) -> TrialRow:
+def _trials(config: ExploreConfig, numbers: range, pictures: Path | None) -> list[tuple[int, Outcome]]:
     from sim import exploration
 
-    kind = config.kind_of(number)
-    picture = None if pictures is None else pictures / f"trial_{number:05d}.png"
-    found = exploration.explore(kind, config.seed, number, picture)
-    setup, described = found.setup, found.descriptors
+    found = []
+    for number in numbers:
+        picture = None if pictures is None else pictures / f"trial_{number:05d}.png"
+        kind, block = config.block_of(number)
+        found.append((number, exploration.explore(kind, config.seed, block, number % BLOCK, picture)))
+    return found
+
+
+def _row(number: int, found: Outcome) -> TrialRow:
+    setup = found.setup
     told = {
         "trial": number,
         "manipulator": setup.manipulator,
         "object": setup.object,
-        "kind": kind,
+        "kind": setup.kind,
         "hand": setup.hand,
         "action": setup.action,
-        **described,
+        **found.descriptors,
         **dict(zip(("x0", "y0", "x1", "y1"), (*found.start, *found.end), strict=True)),
         "fell": int(found.fell),
         "draws": found.draws,
