@@ -1,4 +1,4 @@
-"""Where the data lies: `domains/` and `grammar/`, in a checkout and in an installed wheel alike."""
+"""Where the data lies: `domains/`, `grammar/`, the robot's trials; in a checkout and in a wheel alike."""
 
 from __future__ import annotations
 
@@ -32,6 +32,11 @@ def domains_dir() -> Path:
 def learned_affordances() -> Path:
     """What comes with the project of what was learned about tools and hands."""
     return Path(__file__).resolve().parent / "affordances" / "data" / "learned.json"
+
+
+def trials_path() -> Path:
+    """The robot's own trials of hands and tools; how they were made is told beside them."""
+    return Path(__file__).resolve().parent / "affordances" / "data" / "explored.parquet"
 
 
 def grammar_text(name: str) -> str:

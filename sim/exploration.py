@@ -1,10 +1,12 @@
 """One trial of the robot's own exploration: a tool or a bare hand moves an object, and where it went is seen.
 
-Each of the four actions is one fixed movement in a straight line, whatever is in the hand: nothing is refused
-because a tool does not suit. Taps and pushes begin beside or before the object, pulls behind it: the shaft of
-a tool lies beside the object then, on the side where more of the tool's head is, and a bare hand reaches over
-it. A little of everything is left to chance: where the object stands and how it is turned, how well the
-robot aims, how far it moves, friction.
+Each of the four actions is one fixed movement in a straight line, whatever is in the hand: nothing is
+refused because a tool does not suit. Taps and pushes begin beside or before the object, pulls behind it:
+the shaft of a tool lies beside the object then, on the side where more of the tool's head is, and a bare
+hand reaches over it. The middle of the tool's head, or the finger tips, are taken to a fixed place a
+little beyond where the object's middle was; so it depends on the shapes of both how far the object goes,
+if it goes at all. A little of everything is left to chance: where the object stands and how it is turned,
+how well the robot aims, how far it moves, friction.
 
 The arm follows inverse kinematics with its controllers; contact and friction decide the rest. A trial begins
 with the hand already beside the object, and a tool is fixed to the hand: grips that slip are another subject.
@@ -44,21 +46,23 @@ DIRECTIONS: Mapping[str, float] = {  # rad, of the world; the robot looks along 
     "pull": 0.0,
     "push": math.pi,
 }
-TOOL_WAY: Mapping[str, float] = {  # m from the first contact on, about what the published trials moved things
-    "tapFromLeft": 0.11,
-    "tapFromRight": 0.11,
-    "pull": 0.12,
-    "push": 0.11,
+TOOL_END: Mapping[str, float] = {
+    "tapFromLeft": 0.020,
+    "tapFromRight": 0.020,
+    "pull": 0.035,
+    "push": 0.030,
 }
-HAND_WAY: Mapping[str, float] = {"tapFromLeft": 0.085, "tapFromRight": 0.085, "pull": 0.06, "push": 0.12}
-WAY_SPREAD = 0.018  # m
+"""How far beyond the place of the object's middle the middle of a tool's head is taken, metres."""
+HAND_END: Mapping[str, float] = {"tapFromLeft": 0.03, "tapFromRight": 0.03, "pull": 0.015, "push": 0.04}
+"""The same for the tips of the fingers."""
+END_SPREAD = 0.010  # m
 GAP = 0.008  # m between effector and object at first, at least
 GAP_SPREAD = 0.008  # m
 AIM_SPREAD = 0.015  # m across the course
 COURSE_SPREAD, SKEW_SPREAD = 0.10, 0.07  # rad
 OVERLAP = 0.012  # m that a tapping tool reaches beyond the object's middle
 FRICTION_SPREAD = 0.25  # of friction, up or down
-SPEED = 0.10  # m/s
+SPEED = 0.12  # m/s
 INSET = 0.05  # m from the end of its handle, where a tool is held
 DEPTH = 0.047  # m from the palm to the middle of the shaft between the pads
 TOOL_X, HAND_X = (-0.68, -0.45), (-0.46, -0.28)  # m
@@ -205,7 +209,7 @@ class Bench:
             aside=float(rng.normal(0.0, AIM_SPREAD)),
             skew=float(rng.normal(0.0, SKEW_SPREAD)),
             side=1.0 if rng.uniform() < 0.5 else -1.0,
-            further=float(np.clip(rng.normal(0.0, WAY_SPREAD), -2 * WAY_SPREAD, 2 * WAY_SPREAD)),
+            further=float(rng.normal(0.0, END_SPREAD)),
             pitch=float(rng.uniform(-0.12, 0.12)),
         )
         friction = FRICTION * float(rng.uniform(1 - FRICTION_SPREAD, 1 + FRICTION_SPREAD))
@@ -238,13 +242,16 @@ class Bench:
         stance = bare.stance(self.hand, posture, course + heading + chance.skew, pitch + chance.pitch, roll)
         across = (-math.sin(course), math.cos(course))
         aimed = (place[0] + chance.aside * across[0], place[1] + chance.aside * across[1])
-        way = HAND_WAY[action] + chance.further
         X_WO = RigidTransform(RotationMatrix.MakeZRotation(yaw), [*aimed, 0.0])
         xy = X_WO.translation()
         body = footprint(self.shape, (float(xy[0]), float(xy[1])), yaw)
-        sweep = bare.aimed(stance, body, aimed, self.shape.height, course, way)
-        low = self.scene.table.height + stance.radius + sweep.height
-        return stance.target(np.array([*sweep.start, low])), stance.target(np.array([*sweep.end, low]))
+        start = bare.aimed(stance, body, aimed, self.shape.height, course, GAP)
+        ahead = (math.cos(course), math.sin(course))
+        to_middle = (aimed[0] - start.start[0]) * ahead[0] + (aimed[1] - start.start[1]) * ahead[1]
+        way = to_middle + HAND_END[action] + chance.further
+        end = (start.start[0] + way * ahead[0], start.start[1] + way * ahead[1])
+        low = self.scene.table.height + stance.radius + start.height
+        return stance.target(np.array([*start.start, low])), stance.target(np.array([*end, low]))
 
     def _path(self, first: HandTarget, last: HandTarget) -> list[Joints] | None:
         """Joints along the straight line between two targets."""
@@ -324,7 +331,6 @@ def tool_course(
     ahead, across = (math.cos(course), math.sin(course)), (-math.sin(course), math.cos(course))
     behind, aside = half_width(obj, course - yaw), half_width(obj, course + math.pi / 2 - yaw)
     half, (low, high) = tool.width / 2, tool.sides
-    way = chance.gap + TOOL_WAY[action] + chance.further
     if action == "pull":
         # More of the head is on this side of the shaft, so the object is to be there.
         side = math.copysign(1.0, high + low) if abs(high + low) > 1e-6 else chance.side
@@ -343,6 +349,7 @@ def tool_course(
         place[0] - back * ahead[0] + offset * across[0],
         place[1] - back * ahead[1] + offset * across[1],
     )
+    way = back + TOOL_END[action] + chance.further
     return start, (start[0] + way * ahead[0], start[1] + way * ahead[1])
 
 

@@ -68,9 +68,9 @@ _BRICK = Compound(
     ),
 )
 OBJECTS: Mapping[str, Shape] = {
-    "Ball": Sphere(type="sphere", radius=0.028),
-    "Cube": _box(0.050, 0.050, 0.040),
-    "Slice": _cylinder(0.034, 0.014),
+    "Ball": Sphere(type="sphere", radius=0.020),
+    "Cube": _box(0.045, 0.045, 0.040),
+    "Plate": _cylinder(0.046, 0.014),
     "Can": _cylinder(0.026, 0.060),
     "Brick": _BRICK,
     "Pear": _PEAR,

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cognitive_arch.affordances.evaluation import Evaluation, evaluate
+from cognitive_arch.affordances.explored import EXPLORED, read_explored
 from cognitive_arch.affordances.metrics import confidences, reliability
 from cognitive_arch.affordances.model import marginals_of
 from cognitive_arch.affordances.networks import NetworkModel
@@ -25,7 +26,10 @@ Notice = Callable[[str], None]
 
 
 def load_table(trials: str, data: Path | None) -> TrialTable:
-    """A file of trials, or a published table by its name when `data` says where these lie."""
+    """A file of trials, the robot's own exploration by name, or a published table by name when `data` says
+    where these lie."""
+    if trials in EXPLORED and not Path(trials).exists():
+        return read_explored(trials)
     if data is not None and not Path(trials).is_file():
         return read_published(data, trials)
     if trials in READERS and not Path(trials).exists():

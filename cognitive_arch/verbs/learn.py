@@ -53,10 +53,11 @@ def networks(
         str,
         typer.Argument(
             metavar="TRIALS",
-            help="A file of trials (.csv, .parquet, .npz), or, with --data, a published table: hand, tool, "
-            "icub_tools, tools_2016.",
+            help="A file of trials (.csv, .parquet, .npz); explored, explored-hand, explored-tool (the "
+            "robot's own, which come along); or, with --data, a published table: hand, tool, icub_tools, "
+            "tools_2016.",
         ),
-    ],
+    ] = "explored",
     model: Annotated[
         str,
         typer.Option(
