@@ -138,8 +138,12 @@ def explore(kind: str, seed: int, block: int, place: int, picture: Path | None =
     What it is follows from `seed` and these numbers alone. `picture` is where to keep a picture (PNG) of
     before and after.
     """
-    setup = draw_setup(kind, seed, block, place)
     rng = np.random.default_rng([seed, len(kind), block, place])
+    return try_out(draw_setup(kind, seed, block, place), rng, picture)
+
+
+def try_out(setup: Setup, rng: np.random.Generator, picture: Path | None = None) -> Outcome:
+    """One trial, all that is left to chance drawn from `rng`."""
     bench = Bench.of(setup.hand, setup.manipulator, setup.object)
     for draws in range(DRAWS):
         attempt = bench.draw(setup, rng)

@@ -9,13 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+from cognitive_arch.affordances.explored import HELD_OUT
 from cognitive_arch.domain import Domain, ObjectSpec
 from cognitive_arch.shapes import Box, Compound, Cylinder, Part, Shape, Sphere, ToolShape
 
 TOOL_COLOR, OBJECT_COLOR = (0.50, 0.30, 0.10), (0.20, 0.45, 0.75)
 DENSITY = 350.0  # kg/m^3, hollow toys and light wood
-HELD_OUT = "Loaf"
-"""The eighth object, for `cogarch learn networks --protocol leave-one-object-out` and its like."""
 
 
 def _tool(length: float, width: float, bar: float = 0.0, offset: float = 0.0) -> ToolShape:
