@@ -107,9 +107,11 @@ def reproduce(name: str, options: Options) -> dict[str, Any]:
         "name": name,
         "title": entry.title,
         "source": entry.source,
-        "success": all(check.holds for check in found.checks),
+        "success": bool(all(check.holds for check in found.checks)),
         "checks": [
-            {"what": c.what, "published": c.published, "ours": c.ours, "holds": c.holds} for c in found.checks
+            # numpy's comparisons are no truth values of JSON
+            {"what": c.what, "published": c.published, "ours": c.ours, "holds": bool(c.holds)}
+            for c in found.checks
         ],
         **found.numbers,
         "seed": options.seed,

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from cognitive_arch.evaluation import reproduction
@@ -33,10 +34,10 @@ def test_an_unknown_name_lists_the_valid_ones(cogarch: Any) -> None:
 def test_what_does_not_agree_is_told_by_the_exit_code(
     cogarch: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, holds: bool
 ) -> None:
-    found = Reproduced((Check("speed", "0.83", "0.80", True), Check("success", "1", "0", holds)), {"n": 3})
+    found = Reproduced((Check("speed", "0.83", "0.80", np.True_), Check("success", "1", "0", np.bool_(holds))), {"n": 3})
     monkeypatch.setattr(reproduction.Reproduction, "load", lambda self: lambda options: found)
     answer = cogarch("reproduce", "fig58", "--out", str(tmp_path), "--json")
-    assert answer.code == (0 if holds else 1)
+    assert answer.code == (0 if holds else 1), answer.err
     assert answer.json["success"] is holds
     assert answer.json["n"] == 3
     assert answer.json["checks"][1] == {"what": "success", "published": "1", "ours": "0", "holds": holds}
