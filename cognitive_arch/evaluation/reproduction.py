@@ -35,13 +35,20 @@ class Options:
 class Check:
     """One thing that was published, what we got, and whether that agrees.
 
-    `what` says what is compared, `published` quotes or gives the figure, `ours` gives ours.
+    `what` says what is compared, `published` quotes or gives the figure, `ours` gives ours. `bound` is told
+    where something is missed that nobody can reach: what the best possible is, and that ours comes close.
     """
 
     what: str
     published: str
     ours: str
     holds: bool
+    bound: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """In one word."""
+        return "agrees" if self.holds else "bound" if self.bound else "differs"
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,10 +114,11 @@ def reproduce(name: str, options: Options) -> dict[str, Any]:
         "name": name,
         "title": entry.title,
         "source": entry.source,
-        "success": bool(all(check.holds for check in found.checks)),
+        "success": all(check.verdict != "differs" for check in found.checks),
         "checks": [
             # numpy's comparisons are no truth values of JSON
             {"what": c.what, "published": c.published, "ours": c.ours, "holds": bool(c.holds)}
+            | ({"bound": c.bound} if c.verdict == "bound" else {})
             for c in found.checks
         ],
         **found.numbers,
@@ -135,11 +143,16 @@ def answer_text(answer: Mapping[str, Any]) -> str:
     """The answer of `reproduce` for a terminal: every check with ours beside the published."""
     lines = [f"{answer['source']}: {answer['title']}"]
     for check in answer["checks"]:
-        lines.append(f"{'agrees ' if check['holds'] else 'DIFFERS'}  {check['what']}")
+        word = "agrees " if check["holds"] else "BOUND  " if "bound" in check else "DIFFERS"
+        lines.append(f"{word}  {check['what']}")
         lines.append(f"           published  {check['published']}")
         lines.append(f"           ours       {check['ours']}")
+        if "bound" in check:
+            lines.append(f"           bound      {check['bound']}")
     agreeing = sum(check["holds"] for check in answer["checks"])
+    bounded = sum("bound" in check for check in answer["checks"])
     lines.extend(f"note     {note}" for note in answer.get("notes", ()))
-    lines.append(f"{agreeing} of {len(answer['checks'])} agree; {answer['wall_s']:.1f} s")
+    beyond = f", {bounded} cannot be had by anyone" if bounded else ""
+    lines.append(f"{agreeing} of {len(answer['checks'])} agree{beyond}; {answer['wall_s']:.1f} s")
     lines.extend(f"wrote {path}" for path in answer["files"] if not path.endswith(".svg"))
     return "\n".join(lines)

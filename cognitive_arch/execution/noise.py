@@ -48,15 +48,20 @@ class NoiseLevels:
         return cls(**levels)
 
     def of(self, action: GroundAction, capabilities: Mapping[str, str]) -> float:
-        """The level that applies to `action`: its own capability's, or that of the arm that does it.
+        """The level that applies to `action` (see `capability`)."""
+        return float(asdict(self)[capability(action, capabilities)])
 
-        `capabilities` maps action names to `arm`, `pull` or `push` (from the domain file); actions that
-        are not named there belong to the arm.
-        """
-        capability = capabilities.get(action.name, "arm")
-        if capability == "arm":
-            capability = "left" if "LeftHand" in action.args else "right"
-        return float(asdict(self)[capability])
+
+def capability(action: GroundAction, capabilities: Mapping[str, str]) -> str:
+    """Whose level applies to `action`: `pull`, `push`, or that of the arm that does it, `left` or `right`.
+
+    `capabilities` maps action names to `arm`, `pull` or `push` (from the domain file); actions that are not
+    named there belong to the arm.
+    """
+    found = capabilities.get(action.name, "arm")
+    if found == "arm":
+        return "left" if "LeftHand" in action.args else "right"
+    return found
 
 
 def _shortest(level: float) -> str:

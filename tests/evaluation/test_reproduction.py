@@ -34,7 +34,8 @@ def test_an_unknown_name_lists_the_valid_ones(cogarch: Any) -> None:
 def test_what_does_not_agree_is_told_by_the_exit_code(
     cogarch: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, holds: bool
 ) -> None:
-    found = Reproduced((Check("speed", "0.83", "0.80", np.True_), Check("success", "1", "0", np.bool_(holds))), {"n": 3})
+    checks = Check("speed", "0.83", "0.80", np.True_), Check("success", "1", "0", np.bool_(holds))
+    found = Reproduced(checks, {"n": 3})
     monkeypatch.setattr(reproduction.Reproduction, "load", lambda self: lambda options: found)
     answer = cogarch("reproduce", "fig58", "--out", str(tmp_path), "--json")
     assert answer.code == (0 if holds else 1), answer.err
@@ -43,6 +44,26 @@ def test_what_does_not_agree_is_told_by_the_exit_code(
     assert answer.json["checks"][1] == {"what": "success", "published": "1", "ours": "0", "holds": holds}
     shown = cogarch("reproduce", "fig58", "--out", str(tmp_path))
     assert ("DIFFERS" in shown.out) is not holds
+
+
+def test_what_nobody_can_reach_is_no_failure(
+    cogarch: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    checks = (
+        Check("speed", "1", "1", True, bound="not told where the target is met"),
+        Check("cost", "at most 5 %", "20 %", False, bound="nobody stays below 18 %"),
+    )
+    found = Reproduced(checks)
+    monkeypatch.setattr(reproduction.Reproduction, "load", lambda self: lambda options: found)
+    answer = cogarch("reproduce", "reliability", "--out", str(tmp_path), "--json")
+    assert (answer.code, answer.json["success"]) == (0, True)
+    assert [check["holds"] for check in answer.json["checks"]] == [True, False]
+    assert [check.get("bound") for check in answer.json["checks"]] == [None, "nobody stays below 18 %"]
+    shown = cogarch("reproduce", "reliability", "--out", str(tmp_path)).out
+    assert "BOUND    cost" in shown
+    assert "nobody stays below 18 %" in shown
+    assert "1 of 2 agree, 1 cannot be had by anyone" in shown
+    assert "DIFFERS" not in shown
 
 
 def test_a_figure_is_recomputed_with_its_checks(cogarch: Any, tmp_path: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from hypothesis import strategies as st
 from scipy import stats
 
 from cognitive_arch.errors import SweepError
-from cognitive_arch.evaluation.bounds import least_regret, omniscient_cost
+from cognitive_arch.evaluation.bounds import Learner, Steps, Task, omniscient_cost, steps_of
 from cognitive_arch.evaluation.figures import LOOKS
 from cognitive_arch.evaluation.results import read_rows, write_results
 from cognitive_arch.evaluation.running import run_sweep
@@ -94,12 +95,65 @@ def test_what_somebody_who_knew_the_noise_would_pay() -> None:
     assert omniscient_cost("complex", NoiseLevels(), quiet_release=False) == pytest.approx(7)
 
 
-def test_nobody_who_has_to_learn_the_noise_pays_that_everywhere() -> None:
-    knowing = [min(2 + 2 / (1 - level), 20) for level in NOISE]
-    regret = least_regret(NOISE, knowing)
-    assert 1.1 < regret.ratio < 1.4
-    assert max(c / k for c, k in zip(regret.costs, knowing, strict=True)) == pytest.approx(regret.ratio)
-    assert least_regret([0.5], [6]).ratio == pytest.approx(1, abs=1e-3)
+EQUAL = [NoiseLevels(level, level, level, level) for level in NOISE]
+KNOWING = [min(2 + 2 / (1 - level), 20) for level in NOISE]
+
+
+@pytest.fixture(scope="module")
+def steps() -> Steps:
+    return steps_of(Task("simple", quiet_release=True))
+
+
+def test_steps_lead_to_the_goal_and_never_back(steps: Steps) -> None:
+    assert len(steps) == 12
+    assert steps.count(None) == 1
+    reached: set[int] = set()
+
+    def visit(state: int, path: tuple[int, ...]) -> None:
+        assert state not in path
+        reached.add(state)
+        for step in steps[state] or ():
+            visit(step.after, (*path, state))
+
+    visit(0, ())
+    assert reached == set(range(12))
+
+
+def test_who_has_to_learn_the_noise_pays_more_than_who_knows_it(steps: Steps) -> None:
+    learner = Learner(steps, EQUAL)
+    ratio, mean = learner.least_ratio(KNOWING), learner.least_mean()
+    assert 1.1 < ratio.least < 1.4
+    assert max(c / k for c, k in zip(ratio.costs, KNOWING, strict=True)) == pytest.approx(ratio.least)
+    assert np.mean(mean.costs) == pytest.approx(mean.least)
+    assert np.mean(KNOWING) < mean.least <= np.mean(ratio.costs)
+
+
+@pytest.mark.parametrize("n", range(len(NOISE)))
+def test_with_one_level_there_is_nothing_to_learn(steps: Steps, n: int) -> None:
+    """Then a policy pays what one that knows the level pays, however early it is told."""
+    for failures in (0, 3):
+        learner = Learner(steps, EQUAL[n : n + 1], failures=failures)
+        assert learner.least_mean().least == pytest.approx(KNOWING[n])
+        assert learner.least_ratio([KNOWING[n]]).least == pytest.approx(1)
+
+
+def test_the_later_the_levels_are_told_the_dearer(steps: Steps) -> None:
+    least = [Learner(steps, EQUAL, failures=n).least_mean().least for n in (0, 2, 6, 13, 15)]
+    assert least[0] == pytest.approx(np.mean(KNOWING))
+    assert all(b > a - 1e-9 for a, b in itertools.pairwise(least))
+    assert least[3] == pytest.approx(least[4], rel=2e-3)
+
+
+def test_to_succeed_and_to_pay_nothing_more_without_noise_has_its_price(steps: Steps) -> None:
+    learner = Learner(steps, [*EQUAL, *(NoiseLevels(level, 0.25) for level in NOISE)])
+    free, bound = learner.least_mean(), learner.least_mean({5: 4.0}, {3: 0.97})
+    assert free.costs[5] > 4.1  # it begins with the arm that is never bad
+    assert free.success[3] < 0.9
+    assert bound.costs[5] == pytest.approx(4)
+    assert bound.success[3] >= 0.97 - 1e-6
+    assert bound.least > free.least
+    with pytest.raises(SweepError, match="cannot be computed"):
+        learner.least_mean({0: 3.0})
 
 
 @pytest.fixture(scope="module")
