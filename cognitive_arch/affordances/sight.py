@@ -30,7 +30,9 @@ def seen_thing(text: str, part: str, names: Sequence[str], formulas: str) -> Thi
         raise AffordanceError(unknown("set of formulas", formulas, descriptors.FORMULAS))
     file, _, number = text.partition("#")
     image = images.read_image(Path(file))
-    seen = vision.see(image, segmentation.make_segmenter("colour"), formulas=formulas)
+    # As `cogarch see` does, so that blobs have the same numbers and shapes.
+    margin = segmentation.MARGINS["colour"]
+    seen = vision.see(image, segmentation.make_segmenter("colour"), formulas=formulas, margin=margin)
     if not seen:
         raise AffordanceError(f"nothing is seen in '{one_line(file)}'")
     if not number:

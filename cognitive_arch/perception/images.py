@@ -76,14 +76,17 @@ def read_image(path: Path) -> Image:
         raise PerceptionError(f"cannot read the image {_quoted(path)}: {_reason(error)}") from None
 
 
-def read_mask(path: Path, size: tuple[int, int]) -> NDArray[np.bool_]:
+def read_mask(path: Path) -> NDArray[np.bool_]:
     """A picture as a mask, (height, width) bool: true where it is not black, or in a JPEG brighter than its
-    noise.
-
-    Raises `PerceptionError` where it is not of `size` (width, height).
-    """
+    noise."""
     black = JPEG_NOISE if path.suffix.lower() in (".jpg", ".jpeg") else 0
     mask: NDArray[np.bool_] = read_image(path).max(axis=2) > black
+    return mask
+
+
+def fitting(path: Path, mask: NDArray[np.bool_], size: tuple[int, int]) -> NDArray[np.bool_]:
+    """The mask (height, width) that was read from `path`, if it is of `size` (width, height); raises
+    `PerceptionError` else."""
     if mask.shape != size[::-1]:
         raise PerceptionError(
             f"the mask {_quoted(path)} is {mask.shape[1]}x{mask.shape[0]} pixels; "

@@ -54,15 +54,7 @@ class Segmenter(Protocol):
 
 
 class _Segmenter:
-    """What all have in common: arguments are checked alike, and the mask is finished alike.
-
-    `margin` pixels are added around things (0 without).
-    """
-
-    def __init__(self, margin: int = 0) -> None:
-        if not 0 <= margin <= 50:
-            raise PerceptionError(f"a margin of {margin} pixels; valid: 0 to 50")
-        self._grow = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * margin + 1,) * 2) if margin else None
+    """What all have in common: arguments are checked alike, and nothing is found where it is not to be."""
 
     def segment(self, image: Image, ignore: Ignored | None = None, depth: Depth | None = None) -> Mask:
         """See `Segmenter`."""
@@ -72,8 +64,6 @@ class _Segmenter:
             if other is not None and other.shape != image.shape[:2]:
                 raise PerceptionError(f"a {what} of {other.shape}; valid for this image: {image.shape[:2]}")
         mask = self._segment(image, ignore, depth)
-        if self._grow is not None:
-            mask = np.asarray(cv2.dilate(mask, self._grow), np.uint8)
         if ignore is not None:
             mask[ignore.astype(np.bool_, copy=False)] = 0
         return mask
@@ -145,8 +135,7 @@ class DepthSegmenter(_Segmenter):
     Colour, shadows and reflections do not matter here; what is thinner than `rise` is not seen.
     """
 
-    def __init__(self, camera: Camera, table: float, rise: float = RISE, margin: int = 0) -> None:
-        super().__init__(margin)
+    def __init__(self, camera: Camera, table: float, rise: float = RISE) -> None:
         self.camera, self.table, self.rise = camera, table, rise
         width, height = camera.size
         z_x, z_y, z_z = camera.X_WC[2, :3]
@@ -173,6 +162,10 @@ SEGMENTERS: dict[str, Callable[..., Segmenter]] = {
 }
 DEFAULT = "colour"
 FOR_PLAIN_IMAGES = ("colour", "texture")
+MARGINS = {"colour": 2, "texture": 0}
+"""Pixels that a thing in a camera's picture goes on beyond what a segmenter finds: edges are blurred, and
+`colour` leaves out what is half table; `texture` sees an edge from both sides. Rendered ones need none."""
+MAX_MARGIN = 50
 
 
 def make_segmenter(name: str = DEFAULT, **settings: Any) -> Segmenter:
@@ -186,6 +179,41 @@ def make_segmenter(name: str = DEFAULT, **settings: Any) -> Segmenter:
             f"valid for it: {', '.join(FOR_PLAIN_IMAGES)}"
         )
     return SEGMENTERS[name](**settings)
+
+
+def check_margin(margin: int) -> None:
+    """Raise `PerceptionError` for a margin (pixels) out of range."""
+    if not 0 <= margin <= MAX_MARGIN:
+        raise PerceptionError(f"a margin of {margin} pixels; valid: 0 to {MAX_MARGIN}")
+
+
+def widened(mask: Mask, margin: int) -> Mask:
+    """The pieces of `mask` (height, width) with `margin` pixels more around each; those that were apart (8
+    neighbours) stay apart, by a gap of one pixel. Raises `PerceptionError` for a margin out of range."""
+    check_margin(margin)
+    if margin == 0:
+        return mask
+    disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * margin + 1,) * 2)
+    wider = np.asarray(cv2.dilate(mask, disc), np.uint8)
+    if _pieces(wider) == _pieces(mask):
+        return wider
+    # Each pixel belongs to the nearest piece. Numbers up to 2^24 are exact as float32, which can be dilated.
+    _, labels = cv2.distanceTransformWithLabels(
+        cv2.bitwise_not(mask), cv2.DIST_L2, 5, labelType=cv2.DIST_LABEL_CCOMP
+    )
+    number, side = labels.astype(np.float32), np.ones((3, 3), np.uint8)
+    least_around = cv2.erode(np.where(wider > 0, number, np.inf), side)
+    own_around = cv2.dilate(np.where(mask > 0, number, 0), side)
+    least_own_around = cv2.erode(np.where(mask > 0, number, np.inf), side)
+    # An added pixel gives way where it would touch another piece, or what was added to one of a lower number.
+    touches = (least_around < number) | (own_around > number) | (least_own_around < number)
+    wider[(mask == 0) & touches] = 0
+    return wider
+
+
+def _pieces(mask: Mask) -> int:
+    _, tree = cv2.findContours(mask, cv2.RETR_CCOMP, cv2.CHAIN_APPROX_SIMPLE)
+    return 0 if tree is None else int(np.count_nonzero(np.asarray(tree)[0, :, 3] < 0))
 
 
 def binary_patterns(grey: NDArray[np.uint8], flat: int = 0) -> NDArray[np.uint8]:

@@ -17,7 +17,7 @@ from cognitive_arch.errors import PerceptionError
 from cognitive_arch.perception import descriptors
 from cognitive_arch.perception.descriptors import Descriptions, describe
 from cognitive_arch.perception.labelling import MIN_AREA, Blob, label_blobs
-from cognitive_arch.perception.segmentation import Ignored, Image, Segmenter
+from cognitive_arch.perception.segmentation import Ignored, Image, Segmenter, widened
 
 OUTLINE, PAPER, INK = (230, 30, 200), (255, 255, 255), (20, 20, 20)
 FONT = cv2.FONT_HERSHEY_SIMPLEX
@@ -62,33 +62,44 @@ def see(
     recogniser: Recogniser | None = None,
     formulas: str = descriptors.DEFAULT,
     min_area: int = MIN_AREA,
+    margin: int = 0,
 ) -> list[SeenBlob]:
     """The blobs in `image` (height, width, 3) uint8 RGB, from the top downwards.
 
     `mask` (height, width), not 0 on things, takes the place of the segmenter's. `ignore` is true where
-    nothing is to be found. Blobs of less than `min_area` pixels are left out. Raises `PerceptionError` for
-    arrays that do not fit together and for unknown `formulas`.
+    nothing is to be found. Blobs of less than `min_area` pixels are left out. To what the segmenter finds
+    `margin` pixels are added all around; names are given by what it found. Raises `PerceptionError` for
+    arrays that do not fit together, for unknown `formulas` and for a margin out of range.
     """
+    found: NDArray[np.uint8] | NDArray[np.bool_]
     if mask is None:
-        mask = segmenter.segment(image, ignore, depth)
+        segmented = segmenter.segment(image, ignore, depth)
+        found, mask = segmented, widened(segmented, margin)
     else:
         if mask.shape != image.shape[:2]:
             raise PerceptionError(f"a mask of {mask.shape}; valid for this image: {image.shape[:2]}")
-        if ignore is not None:
-            mask = np.where(ignore, 0, mask).astype(np.uint8)
+        found = mask
+    if ignore is not None:
+        mask = np.where(ignore, 0, mask).astype(np.uint8)
     seen = []
     for blob in label_blobs(mask, min_area).blobs:
         described = describe(blob.mask, formulas)
-        label, probability = _name(image, blob, recogniser)
+        label, probability = _name(image, blob, found, recogniser)
         seen.append(SeenBlob(blob, described, label, probability))
     return seen
 
 
-def _name(image: Image, blob: Blob, recogniser: Recogniser | None) -> tuple[str | None, float | None]:
+def _name(
+    image: Image,
+    blob: Blob,
+    found: NDArray[np.uint8] | NDArray[np.bool_],
+    recogniser: Recogniser | None,
+) -> tuple[str | None, float | None]:
     if recogniser is None:
         return None, None
     x, y, width, height = blob.bbox
-    return recogniser.classify(image[y : y + height, x : x + width], blob.mask.view(np.bool_))[0]
+    part = (slice(y, y + height), slice(x, x + width))
+    return recogniser.classify(image[part], blob.mask.view(np.bool_) & (found[part] > 0))[0]
 
 
 def annotated(image: Image, seen: Sequence[SeenBlob]) -> Image:

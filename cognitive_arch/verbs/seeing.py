@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -12,6 +12,7 @@ from cognitive_arch.errors import PerceptionError, one_line
 from cognitive_arch.verbs.common import Json, Stopped, print_answer
 
 if TYPE_CHECKING:
+    from cognitive_arch.perception.calibration import TableView
     from cognitive_arch.perception.images import Image
     from cognitive_arch.perception.vision import Recogniser, SeenBlob
 
@@ -34,11 +35,23 @@ def see(
     domain: Annotated[
         str | None, typer.Option(help="Name what is seen as things of this domain, or as unknown.")
     ] = None,
-    margin: Annotated[int, typer.Option(help="Pixels added around what the segmenter finds.")] = 0,
+    margin: Annotated[
+        int | None,
+        typer.Option(
+            help="Pixels added around what the segmenter finds, which keeps blobs apart: by default 2 for "
+            "colour, as a camera blurs edges, and 0 for texture. Rendered pictures need 0."
+        ),
+    ] = None,
     formulas: Annotated[
         str, typer.Option(help="The descriptors' formulas: shapeDescriptor or blobDescriptor.")
     ] = "shapeDescriptor",
     min_area: Annotated[int, typer.Option(min=1, help="Pixels; smaller blobs are left out.")] = 60,
+    camera: Annotated[
+        Path | None,
+        typer.Option(
+            metavar="FILE", help="The camera's calibration and the table's height: tell places in metres."
+        ),
+    ] = None,
     save: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Write the annotated pictures there.")
     ] = None,
@@ -47,34 +60,51 @@ def see(
     """Find things in an image and describe their shapes, of the whole and of both halves."""
     from cognitive_arch.errors import unknown
     from cognitive_arch.perception import descriptors, images, segmentation, vision
+    from cognitive_arch.perception.calibration import read_calibration
 
-    find = segmentation.make_segmenter(segmenter, **({} if segmenter == "depth" else {"margin": margin}))
+    find = segmentation.make_segmenter(segmenter)
+    wider = segmentation.MARGINS[segmenter] if margin is None else margin
+    segmentation.check_margin(wider)
     if formulas not in descriptors.FORMULAS:
         raise PerceptionError(unknown("set of formulas", formulas, descriptors.FORMULAS))
     names = None if domain is None else _recogniser(domain)
+    view = None if camera is None else read_calibration(camera)
     if save is not None:
         _make_folder(save)
-    read_mask = cache(images.read_mask)  # the same for every frame
+    masks = [(path, images.read_mask(path)) if path is not None else None for path in (mask, ignore)]
     answers: list[dict[str, Any]] = []
     try:
         for name, image in images.frames(source):
-            if isinstance(image, PerceptionError):
-                answers.append({"image": name, "error": str(image)})
+            try:
+                if isinstance(image, PerceptionError):
+                    raise image
+                size = (image.shape[1], image.shape[0])
+                given, hidden = (None if one is None else images.fitting(*one, size) for one in masks)
+                if view is not None:
+                    view.check(size)
+            except PerceptionError as error:
+                if not os.path.isdir(source):
+                    raise
+                answers.append({"image": name, "error": str(error)})  # the folder's others may be usable
                 continue
-            size = (image.shape[1], image.shape[0])
-            given = None if mask is None else read_mask(mask, size)
-            hidden = None if ignore is None else read_mask(ignore, size)
             seen = vision.see(
-                image, find, given, hidden, recogniser=names, formulas=formulas, min_area=min_area
+                *(image, find, given, hidden),
+                recogniser=names,
+                formulas=formulas,
+                min_area=min_area,
+                margin=wider,
             )
-            answer: dict[str, Any] = {"image": name, "width": size[0], "height": size[1]}
-            answer["blobs"] = [one.to_json() for one in seen]
+            answers.append(_answer(name, image, seen, view))
             if save is not None:
-                answer["annotated"] = str(_save(save, name, image, seen))
-            answers.append(answer)
+                answers[-1]["annotated"] = str(_save(save, name, image, seen))
     except KeyboardInterrupt:
         raise Stopped(f"{len(answers)} images seen" + (f", pictures are in {save}" if save else "")) from None
-    used = {"segmenter": "given mask" if mask else segmenter, "domain": domain, "formulas": formulas}
+    used = {
+        "segmenter": "given mask" if mask else segmenter,
+        "margin": 0 if mask else wider,
+        "domain": domain,
+        "formulas": formulas,
+    }
     failed = sum("error" in answer for answer in answers)
     if images.is_many(source):
         whole = {"source": str(source), **used, "failed": failed, "images": answers}
@@ -89,6 +119,14 @@ def _recogniser(domain: str) -> Recogniser:
     from cognitive_arch.perception.recognition import load_recogniser
 
     return load_recogniser(domain)
+
+
+def _answer(name: str, image: Image, seen: list[SeenBlob], view: TableView | None) -> dict[str, Any]:
+    blobs = [one.to_json() for one in seen]
+    if view is not None:
+        for one, told in zip(seen, blobs, strict=True):
+            told["place"] = view.place(one.blob.centroid)
+    return {"image": name, "width": image.shape[1], "height": image.shape[0], "blobs": blobs}
 
 
 def _make_folder(folder: Path) -> None:
@@ -123,10 +161,20 @@ def _text(answer: dict[str, Any]) -> str:
         )
         name = "" if blob["label"] is None else f"{blob['label']} ({blob['probability']:.2f})  "
         x, y = blob["centroid"]
-        lines += [f"  {number:>2}  {name}at {x:.0f}, {y:.0f}  {blob['area']} pixels", f"      {shape}"]
+        lines += [f"  {number:>2}  {name}at {x:.0f}, {y:.0f}  {blob['area']} pixels{_place(blob)}"]
+        lines += [f"      {shape}"]
     if "annotated" in answer:
         lines.append(f"  picture: {answer['annotated']}")
     return "\n".join(lines)
+
+
+def _place(blob: dict[str, Any]) -> str:
+    if "place" not in blob:
+        return ""
+    if blob["place"] is None:
+        return "  not on the table"
+    (x, y), ((xx, _), (_, yy)) = blob["place"]["position"], blob["place"]["covariance"]
+    return f"  on the table at {x:.3f}, {y:.3f} m (+- {xx**0.5:.3f}, {yy**0.5:.3f})"
 
 
 def register(app: typer.Typer) -> None:

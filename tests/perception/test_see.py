@@ -79,6 +79,38 @@ def test_a_folder_tells_of_broken_pictures_and_goes_on(cogarch: Any, picture: Pa
     assert len(whole["blobs"]) == 6
 
 
+@pytest.mark.parametrize("option", ["--mask", "--ignore"])
+def test_a_mask_that_does_not_fit_one_picture_of_a_folder_costs_that_one_only(
+    cogarch: Any, picture: Path, option: str, tmp_path: Path
+) -> None:
+    Pictures.fromarray(six_objects((160, 120))).save(picture.parent / "small.png")
+    (tmp_path / "masks").mkdir()
+    mask = tmp_path / "masks" / "mask.png"
+    Pictures.new("L", (320, 240), 255 if option == "--mask" else 0).save(mask)
+    answer = cogarch("see", str(picture.parent), option, str(mask), "--json")
+    assert (answer.code, answer.json["failed"]) == (1, 1)
+    small, whole = answer.json["images"]
+    assert small["image"] == "small.png"
+    assert "mask.png' is 320x240 pixels; valid for this image: 160x120" in small["error"]
+    assert whole["blobs"]
+    told = cogarch("see", str(picture.parent), option, str(mask)).out
+    assert told.startswith("small.png: the mask ")
+    assert "table.png: 320x240" in told
+
+
+def test_the_margin_goes_with_the_segmenter_and_names_with_what_it_found(cogarch: Any, picture: Path) -> None:
+    def seen(*options: str) -> dict[str, Any]:
+        return cogarch("see", str(picture), "--domain", "sandwich", "--json", *options).json
+
+    usual, none, two = seen(), seen("--margin", "0"), seen("--margin", "2")
+    assert (usual["margin"], none["margin"]) == (2, 0)
+    assert usual == two
+    for wide, narrow in zip(usual["blobs"], none["blobs"], strict=True):
+        assert wide["area"] > narrow["area"]
+        assert (wide["label"], wide["probability"]) == (narrow["label"], narrow["probability"])
+    assert seen("--segmenter", "texture")["margin"] == 0
+
+
 def test_a_video_is_seen_frame_by_frame(cogarch: Any, tmp_path: Path) -> None:
     path = tmp_path / "clip.mp4"
     writer = cv2.VideoWriter(str(path), cv2.VideoWriter.fourcc(*"mp4v"), 10, (320, 240))
@@ -123,6 +155,7 @@ def test_bad_input_is_one_clear_line(cogarch: Any, picture: Path, tmp_path: Path
         (str(picture), "--segmenter", "depth"): "valid for it: colour, texture",
         (str(picture), "--formulas", "mine"): "valid: blobDescriptor, shapeDescriptor",
         (str(picture), "--margin", "-2"): "valid: 0 to 50",
+        (str(picture), "--mask", "nowhere.png"): "nowhere.png",
         (str(picture), "--domain", "kitchens"): "sandwich, toys",
         (str(picture), "--save", str(tmp_path / "file")): "cannot write pictures to",
     }.items():
