@@ -23,6 +23,7 @@ from cognitive_arch.world.observation import HANDS
 Pose = NDArray[np.float64]  # (4, 4), a thing or a hand in the root frame, m
 FAR, FAR_COST = 0.15, 1.0  # m after which distance from where a thing was speaks no further against it
 NEW_COST = 0.5  # in log probability, for a thing that was not there before
+NEAR, NEAR_COST = 0.06, 7.0  # m within which a thing was seen, and what that speaks against a stranger
 CONVINCING = 0.5  # probability from which on a glimpse tells what it shows
 LEAST = 1e-6  # probability
 SAME = 0.008  # m that a thing at rest may seem to move
@@ -196,7 +197,8 @@ class Tracker:
         # One column per thing, then one per detection for its being none of them.
         scores = np.full((len(told), len(names) + len(told)), math.log(LEAST) - 10)
         for row, detection in enumerate(detections[index] for index in told):
-            scores[row, len(names) + row] = math.log(max(detection.unknown, LEAST))
+            cost = NEAR_COST if self._was_here(detection) else 0.0
+            scores[row, len(names) + row] = math.log(max(detection.unknown, LEAST)) - cost
             for name, candidate in detection.candidates.items():
                 scores[row, names.index(name)] = self._score(name, candidate)
         rows, columns = linear_sum_assignment(-scores)
@@ -213,6 +215,18 @@ class Tracker:
             return likely - NEW_COST
         moved = float(np.linalg.norm(track.pose[:3, 3] - candidate.pose[:3, 3]))
         return likely - min(moved / FAR, 1.0) * FAR_COST
+
+    def _was_here(self, detection: Detection) -> bool:
+        """Whether what a detection looks like most was seen here before: one that has fallen over looks
+        little like itself, but it is likelier than a stranger in its place."""
+        if not detection.candidates:
+            return False
+        name, _ = detection.best
+        track = self.tracks.get(name)
+        if track is None or not track.visible or track.hand is not None:
+            return False
+        moved = np.linalg.norm(track.pose[:3, 3] - detection.candidates[name].pose[:3, 3])
+        return bool(moved < NEAR)
 
     def _see(self, name: str, seen: Candidate) -> None:
         track = self.tracks.get(name)

@@ -65,6 +65,21 @@ def test_what_is_most_likely_nothing_known_is_no_thing(tracker: Tracker) -> None
     assert not tracker.tracks
 
 
+def test_what_falls_over_is_still_itself_though_it_looks_like_a_stranger(tracker: Tracker) -> None:
+    look(tracker, seen(lying("Ham", -0.3, 0.1), Ham=0.9))
+    look(tracker, seen(lying("Ham", -0.28, 0.12), Ham=0.01))
+    assert tracker.tracks["Ham"].pose[0, 3] == pytest.approx(-0.28)
+    look(tracker, seen(lying("Ham", -0.45, 0.1), Ham=0.01))
+    assert "Ham" not in tracker.tracks
+
+
+def test_a_stranger_on_what_was_hidden_before_stays_one(tracker: Tracker) -> None:
+    look(tracker, seen(lying("Ham", -0.3, 0.1), Ham=0.9))
+    look(tracker, Ham=Place.HIDDEN)
+    look(tracker, seen(lying("Ham", -0.3, 0.1, on=TABLE + 0.02), Ham=0.01), Ham=Place.HIDDEN)
+    assert not tracker.tracks["Ham"].visible
+
+
 def test_one_name_goes_to_one_thing_and_the_other_gets_the_next_best(tracker: Tracker) -> None:
     first, second = lying("Bun", -0.3, 0.1), lying("Bun", -0.4, 0.0)
     look(tracker, seen(first, Bun=0.6, Lid=0.4), seen(second, Bun=0.9, Lid=0.1))
