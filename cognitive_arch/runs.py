@@ -10,13 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from cognitive_arch.errors import BackendError, StoreError
-from cognitive_arch.execution.backends import (
-    BACKENDS,
-    affordance_source,
-    make_environment,
-    perception_source,
-    reach_model,
-)
+from cognitive_arch.execution.backends import BACKENDS, make_environment, perception_source, reach_model
 from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.episode import EpisodeResult, Step
 from cognitive_arch.execution.grounding import judge_of
@@ -111,7 +105,7 @@ def _as_begun(run: Run) -> tuple[RunConfig, Setting, Task]:
 
 def _learned(config: RunConfig) -> dict[str, object] | None:
     """What the robot has learned of tools and uses, for the manifest."""
-    judge = judge_of(affordance_source(config.affordances))
+    judge = judge_of(config.affordance_source)
     return None if judge is None else judge.told()
 
 
@@ -128,7 +122,7 @@ def _prepared(task: Task, config: RunConfig, setting: Setting) -> Iterator[Envir
         video=config.video,
         reach=config.reach,
         perception=config.perception,
-        shapes_seen=judge_of(affordance_source(config.affordances)) is not None,
+        shapes_seen=judge_of(config.affordance_source) is not None,
     )
     try:
         _check_skills(task, config.backend, environment)
@@ -212,7 +206,7 @@ class _Episode:
             "noise": str(self.config.noise),
             "reach": reach_model(self.config.backend, self.config.reach),
             "perception": perception_source(self.config.backend, self.config.perception),
-            "affordances": affordance_source(self.config.affordances),
+            "affordances": self.config.affordance_source,
             "physical_noise": list(self.environment.noise_told),
             "events": [str(event) for event in self.setting.scene.events],
             **outcome,
@@ -226,17 +220,16 @@ class _Episode:
     def _misbelief(self, step: Step) -> StateChange | None:
         """What the robot takes for true after a step and is not, and what it overlooks."""
         truth = self.environment.truth()
-        return None if truth is None else StateChange.between(_atoms(truth), step.after.atoms())
+        return None if truth is None else StateChange.between(self._atoms(truth), step.after.atoms())
 
     def _goal_holds(self, result: EpisodeResult) -> bool:
         """Whether the goal, in one of the ways to it, really holds in the end."""
         truth = self.environment.truth()
-        atoms = result.final.atoms() if truth is None else _atoms(truth)
+        atoms = result.final.atoms() if truth is None else self._atoms(truth)
         return any(satisfied(ways[-1], atoms) for ways in (self.task.goals, *self.task.alternatives))
 
-
-def _atoms(observation: Observation) -> State:
-    return WorldModel().update(observation).atoms()
+    def _atoms(self, truth: Observation) -> State:
+        return WorldModel().update(self.session.perceive(truth)).atoms()
 
 
 def _check_skills(task: Task, backend: str, environment: Environment) -> None:

@@ -31,7 +31,7 @@ from cognitive_arch.relational.rules import Entity, RuleSet
 from cognitive_arch.relational.symbols import ALL, OTHERHAND, Goal, GroundAction
 from cognitive_arch.scenes import domain_of, load_scene, scene_paths
 from cognitive_arch.world.anchoring import WorldModel
-from cognitive_arch.world.observation import HANDS
+from cognitive_arch.world.observation import HANDS, Observation
 
 FORMAT = 1  # of saved states
 CORE_PREDICATES = {
@@ -161,10 +161,15 @@ class RunConfig:
             raise ConfigError(unknown("backend", self.backend, BACKENDS))
         reach_model(self.backend, self.reach)
         perception_source(self.backend, self.perception)
-        affordance_source(self.affordances)
+        affordance_source(self.backend, self.perception, self.affordances)
         if self.video and not (self.record and self.backend == "drake"):
             raise ConfigError("a video needs physics and a recording: --backend drake, without --no-record")
         make_planner(self.planner)
+
+    @property
+    def affordance_source(self) -> str:
+        """Where the robot knows from what tools are good for (`backends.affordance_source`)."""
+        return affordance_source(self.backend, self.perception, self.affordances)
 
     def to_json(self) -> dict[str, Any]:
         """Plain data for the manifest."""
@@ -173,7 +178,7 @@ class RunConfig:
             "heuristics": str(self.heuristics),
             "reach": reach_model(self.backend, self.reach),
             "perception": perception_source(self.backend, self.perception),
-            "affordances": affordance_source(self.affordances),
+            "affordances": self.affordance_source,
         }
         return asdict(self) | texts | {"events": [str(event) for event in self.events]}
 
@@ -221,12 +226,15 @@ class Session:
         self._observation = environment.reset(config.seed)
         self._world.update(self._observation)
         self._events = setting.scene.events
-        source = affordance_source(config.affordances)
-        self._grounding = make_grounding(source, setting.rules, environment.skills)
+        self._grounding = make_grounding(config.affordance_source, setting.rules, environment.skills)
 
     @property
     def world(self) -> WorldModel:
         return self._world
+
+    def perceive(self, observation: Observation) -> Observation:
+        """What the robot would take its things to be good for if it saw just that."""
+        return self._grounding.perceive(observation)
 
     def understand(self, sentence: str) -> Task:
         """The sentence as a task, given what is in the hands now."""

@@ -2,19 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from scipy.special import ndtr
 
-from cognitive_arch.affordances.trials import EDGES, N_BINS, Floats
+from cognitive_arch.affordances.trials import EDGES, N_BINS, Floats, TrialTable
+from cognitive_arch.errors import AffordanceError, unknown
 
 MEASUREMENT_SIGMA = 0.015
 """Metres: how far off a measured displacement may be (two localisations of about a centimetre each)."""
 ROBOT = (0.0, 0.0)
 """Where the robot stands in its root frame, metres."""
+
+
+def described_by(table: TrialTable, names: Sequence[str]) -> TrialTable:
+    """The trials with only these descriptors of things; raises `AffordanceError` for unknown ones."""
+    for name in names:
+        if name not in table.names_m or name not in table.names_o:
+            known = [n for n in table.names_m if n in table.names_o]
+            raise AffordanceError(unknown("descriptor", name, known))
+    m, h, o = (
+        [place for place, name in enumerate(all_) if name in names]
+        for all_ in (table.names_m, table.names_h, table.names_o)
+    )
+    views_m, views_o = (
+        None if views is None else {thing: shape[:, kept] for thing, shape in views.items()}
+        for views, kept in ((table.views_m, m), (table.views_o, o))
+    )
+    return replace(
+        table,
+        shape_m=table.shape_m[:, m],
+        shape_h=table.shape_h[:, h],
+        shape_o=table.shape_o[:, o],
+        names_m=tuple(table.names_m[place] for place in m),
+        names_h=tuple(table.names_h[place] for place in h),
+        names_o=tuple(table.names_o[place] for place in o),
+        views_m=views_m,
+        views_o=views_o,
+    )
 
 
 def soft_bins(effect: Floats, sigma: float = MEASUREMENT_SIGMA) -> Floats:

@@ -59,6 +59,7 @@ def _episode(config: SweepConfig, cell: Cell, episode: int, environment: Environ
         seed=seed,
         jitter=config.jitter,
         record=False,
+        affordances="default",  # as in the published sweeps
     )
     result = Session(run, setting, environment, planner).perform(task)
     return Row(

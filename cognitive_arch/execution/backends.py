@@ -28,10 +28,11 @@ AFFORDANCES = ("learned", "default", "none")
 environment for which tool pulls; or nowhere, so that any tool may pull, at the rules' own numbers."""
 
 
-def affordance_source(asked: str | None = None) -> str:
-    """One of `AFFORDANCES`, or the file of a model of one's own (.json). Raises `ConfigError`."""
+def affordance_source(backend: str, perception: str | None = None, asked: str | None = None) -> str:
+    """One of `AFFORDANCES`, or the file of a model of one's own (.json). None is `learned` for a robot that
+    sees, `default` for others. Raises `ConfigError`."""
     if asked is None:
-        return "default"
+        return "learned" if perception_source(backend, perception) == "camera" else "default"
     if asked not in AFFORDANCES and not asked.endswith(".json"):
         known = unknown("source of affordances", asked, AFFORDANCES)
         raise ConfigError(f"{known}, or the file of `cogarch learn networks` (.json)")

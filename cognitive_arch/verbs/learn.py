@@ -86,6 +86,10 @@ def networks(
         Path | None,
         typer.Option(metavar="FILE", help="Draw how sure it was against how right (.png, .svg)."),
     ] = None,
+    descriptors: Annotated[
+        str | None,
+        typer.Option(help="Learn from these descriptors only, such as area,convexity [default: all]."),
+    ] = None,
     data: Annotated[
         Path | None, typer.Option(metavar="DIR", help="Folder with the published tables.")
     ] = None,
@@ -93,7 +97,7 @@ def networks(
     as_json: Json = False,
 ) -> None:
     """Learn from trials what actions with hands and tools do to objects."""
-    from cognitive_arch.affordances import answers, evaluation
+    from cognitive_arch.affordances import answers, evaluation, features
     from cognitive_arch.errors import ConfigError, unknown
 
     if evaluate < 0:
@@ -102,8 +106,11 @@ def networks(
         raise ConfigError(unknown("protocol", protocol, evaluation.PROTOCOLS))
     if reliability is not None and not evaluate:
         raise ConfigError("--reliability needs --evaluate SPLITS")
+    table = answers.load_table(trials, data)
+    if descriptors is not None:
+        table = features.described_by(table, [name.strip() for name in descriptors.split(",")])
     answer = answers.learn(
-        answers.load_table(trials, data),
+        table,
         model,
         out,
         graph,
