@@ -31,7 +31,7 @@ def domains_dir() -> Path:
 
 def learned_affordances() -> Path:
     """What comes with the project of what was learned about tools and hands."""
-    return Path(__file__).resolve().parent / "affordances" / "data" / "learned.json"
+    return Path(__file__).resolve().parent / "affordances" / "data" / "learned.json.gz"
 
 
 def trials_path() -> Path:

@@ -77,9 +77,11 @@ class ForestCPD:
     def to_json(self) -> dict[str, Any]:
         """Plain data."""
         arrays = ("feature", "threshold", "left", "right", "roots")
+        # Only leaves are asked for their distributions.
+        value = np.where(self.feature[:, None] == LEAF, self.value, 0.0)
         return {
             **{name: getattr(self, name).tolist() for name in arrays},
-            "value": np.round(self.value, 6).tolist(),
+            "value": np.round(value, 4).tolist(),
             "with_start": self.with_start,
         }
 

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import gzip
 import json
+import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -65,7 +67,7 @@ class Affordances:
         )
 
     def save(self, path: Path | str) -> None:
-        """Write everything as JSON."""
+        """Write everything as JSON; packed, if the name ends in .gz."""
         data = {
             "format": FORMAT,
             "model": self.name,
@@ -77,17 +79,21 @@ class Affordances:
             "source": self.source,
             "parameters": self.model.to_json(),
         }
-        Path(path).write_text(json.dumps(data) + "\n", encoding="utf-8")
+        text = (json.dumps(data) + "\n").encode()
+        # Without a time in it the same is packed to the same.
+        Path(path).write_bytes(gzip.compress(text, mtime=0) if str(path).endswith(".gz") else text)
 
     @classmethod
     def load(cls, path: Path | str) -> Affordances:
         """Read what `save` wrote; raises `AffordanceError` for anything else."""
         path = Path(path)
         try:
-            data = json.loads(path.read_text(encoding="utf-8"))
+            kept = path.read_bytes()
         except OSError:
             raise AffordanceError(f"there is no learned model at '{one_line(path)}'") from None
-        except ValueError as error:
+        try:
+            data = json.loads(gzip.decompress(kept) if path.suffix == ".gz" else kept)
+        except (ValueError, OSError, EOFError, zlib.error) as error:
             raise AffordanceError(f"'{one_line(path.name)}' is no learned model: {one_line(error)}") from None
         if not isinstance(data, dict) or data.get("format") != FORMAT:
             raise AffordanceError(

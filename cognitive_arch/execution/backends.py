@@ -33,7 +33,7 @@ def affordance_source(backend: str, perception: str | None = None, asked: str | 
     sees, `default` for others. Raises `ConfigError`."""
     if asked is None:
         return "learned" if perception_source(backend, perception) == "camera" else "default"
-    if asked not in AFFORDANCES and not asked.endswith(".json"):
+    if asked not in AFFORDANCES and not asked.endswith((".json", ".json.gz")):
         known = unknown("source of affordances", asked, AFFORDANCES)
         raise ConfigError(f"{known}, or the file of `cogarch learn networks` (.json)")
     return asked

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from cognitive_arch.affordances.evaluation import PROTOCOLS, evaluate, splits, without_start
-from cognitive_arch.affordances.features import soft_bins
+from cognitive_arch.affordances.features import described_by, soft_bins
 from cognitive_arch.affordances.metrics import match_distance, reliability, scores, winners
 from cognitive_arch.affordances.model import coupled, marginals_of
 from cognitive_arch.affordances.published import read_published
@@ -179,3 +179,31 @@ def test_each_action_weighs_for_itself_what_matters_to_it() -> None:
     for tool in ("stick", "hook", "rake"):
         mine = pulls.manipulator == tool
         assert closer[mine].mean() == pytest.approx((pulls.effect[mine, 0] > 0.025).mean(), abs=0.2), tool
+
+
+def test_a_packed_file_holds_the_same_and_a_broken_one_is_refused(
+    learned: dict[str, Affordances], tmp_path: Path
+) -> None:
+    plain, packed = tmp_path / "model.json", tmp_path / "model.json.gz"
+    learned["default"].save(plain)
+    learned["default"].save(packed)
+    assert packed.stat().st_size < plain.stat().st_size / 2
+    some = synthetic_trials(20)
+    joint = Affordances.load(packed).model.joint(some)
+    np.testing.assert_array_equal(joint, Affordances.load(plain).model.joint(some))
+    first = packed.read_bytes()
+    learned["default"].save(packed)
+    assert packed.read_bytes() == first
+    for broken in (first[:-9], b"no archive", plain.read_bytes()):
+        packed.write_bytes(broken)
+        with pytest.raises(AffordanceError, match=r"'model.json.gz' is no learned model"):
+            Affordances.load(packed)
+
+
+def test_only_the_descriptors_asked_for_are_learned_from() -> None:
+    table = described_by(synthetic_trials(80), ["convexity", "compactness"])
+    assert table.names_m == table.names_o == ("convexity", "compactness")
+    assert table.shape_m.shape == table.shape_o.shape == (80, 2)
+    np.testing.assert_array_equal(table.shape_m[:, 0], synthetic_trials(80).shape_m[:, 0])
+    with pytest.raises(AffordanceError, match="unknown descriptor 'weight'; valid: compactness, convexity"):
+        described_by(table, ["weight"])
