@@ -52,6 +52,27 @@ def test_every_demo_ends_as_its_file_says(tmp_path: Path, name: str) -> None:
     assert len(told(steps, "outside")) == len(DEMOS.find(name).events)
 
 
+@pytest.mark.parametrize(("name", "taken"), [("by-shape", "Crook"), ("unknown-tool", "Crook")])
+@pytest.mark.parametrize("seed", [0, 1])
+def test_the_tool_is_chosen_by_its_shape(tmp_path: Path, name: str, taken: str, seed: int) -> None:
+    result, steps = play(name, tmp_path, backend="symbolic", seed=seed)
+    used = {c.split(",")[1] for c in calls(result) if c.startswith("pull")}
+    assert used == {taken}
+    rows = [row for step in steps for row in step["probabilities"] if row["action"].startswith("pull(")]
+    assert all(row["from"].startswith("affordances: ") for row in rows)
+    chosen = [row["p"] for row in rows if f",{taken}," in row["action"]]
+    others = [row["p"] for row in rows if f",{taken}," not in row["action"]]
+    assert min(chosen) > 0.5 > max(others)
+
+
+def test_when_the_tool_is_taken_away_another_one_does(tmp_path: Path) -> None:
+    result, steps = play("tool-taken", tmp_path, backend="symbolic")
+    assert calls(result)[0].startswith("graspWith(Rake,")
+    assert any("Rake" in call for call in steps[0]["plan"]["actions"])
+    assert not any("Rake" in call for step in steps[1:] if step["plan"] for call in step["plan"]["actions"])
+    assert {c.split(",")[1] for c in calls(result) if c.startswith("pull")} == {"Crook"}
+
+
 @pytest.mark.parametrize("seed", SEEDS)
 def test_out_of_reach_the_right_tool_is_used(tmp_path: Path, seed: int) -> None:
     result, _ = play("out-of-reach", tmp_path, backend="symbolic", seed=seed)

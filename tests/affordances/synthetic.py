@@ -66,7 +66,7 @@ BARS = (0.0, 0.06, 0.10, 0.14, 0.18)
 TELLING = ("area", "convexity", "eccentricity", "compactness", "circularity", "squareness")
 
 
-def seen_frame(count: int = 600, seed: int = 0) -> Any:
+def seen_frame(count: int = 480, seed: int = 0) -> Any:
     """A `DataFrame` of synthetic trials with things as they look from above: a bar that reaches behind an
     object pulls it, and everything pushes."""
     import pandas as pd

@@ -286,7 +286,7 @@ def test_a_run_is_kept_with_what_it_knew(model: Path, tmp_path: Path, cogarch: A
     fingerprint = kept["manifest"]["learned"]["fingerprint"]
     assert len(fingerprint) == 16
     assert kept["manifest"]["learned"] | {"fingerprint": ""} == {
-        "model": "default", "trials": 600, "source": "synthetic trials", "fingerprint": ""
+        "model": "default", "trials": 480, "source": "synthetic trials", "fingerprint": ""
     }  # fmt: skip
     text = cogarch("inspect", "latest").out
     assert fingerprint in text

@@ -7,9 +7,11 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
+from cognitive_arch.execution.environment import Outcome
 from cognitive_arch.perception.descriptors import DEFAULT, FORMULAS
 from cognitive_arch.perception.top_view import described
 from cognitive_arch.scenes import domain_of, load_scene
+from cognitive_arch.world.anchoring import WorldModel
 from sim.environment import DrakeEnvironment
 from sim.sight import CameraPerception
 from tests.conftest import action
@@ -66,3 +68,14 @@ def test_what_is_held_keeps_the_shape_it_had_on_the_table(stranger: DrakeEnviron
     after = {obj.name: obj for obj in stranger.observe().objects}
     assert stranger.robot.perception.held("RightHand") == "Crook"
     np.testing.assert_array_equal(after["Crook"].tooldesc, before["Crook"])
+
+
+def test_it_pulls(stranger: DrakeEnvironment) -> None:
+    if stranger.robot.perception.held("RightHand") != "Crook":
+        stranger.execute(action("graspWith(Crook,RightHand)"))
+    result = stranger.execute(action("pull(Ham,Crook,RightHand)"))
+    assert result.outcome is Outcome.SUCCESS
+    assert result.effect["displacement_x"] > 0.08
+    assert "reachableWith(Ham,LeftHand)" in {
+        str(atom) for atom in WorldModel().update(stranger.observe()).atoms()
+    }
