@@ -13,18 +13,22 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 
 import numpy as np
 
 from cognitive_arch.execution.backends import make_environment
+from cognitive_arch.execution.environment import Environment
 from cognitive_arch.execution.episode import Step
 from cognitive_arch.execution.grounding import judge_of
 from cognitive_arch.execution.heuristics import Heuristics
 from cognitive_arch.execution.noise import NoiseLevels
 from cognitive_arch.footprint import gets_behind
 from cognitive_arch.planning.registry import DEFAULT_PLANNER
+from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runs import prepare
 from cognitive_arch.session import Progress, RunConfig, Session, Setting
 from cognitive_arch.shapes import ToolShape
@@ -51,6 +55,44 @@ def episodes(config: RunConfig, seeds: Sequence[int], sentence: str) -> list[Epi
     """The task once for every seed."""
     setting = Setting.load(config.scene)
     task = setting.understand(sentence)
+    found = []
+    with _environment(config, setting) as environment:
+        for seed in seeds:
+            steps: list[Step] = []
+            started = time.process_time()
+            session = Session(_with_seed(config, seed), setting, environment)
+            result = session.perform(task, Progress(on_step=steps.append))
+            spent = time.process_time() - started
+            found.append(_judged(seed, result.success, result.total, steps, setting, spent))
+            print(f"{config.affordances} {found[-1]}", file=sys.stderr, flush=True)
+    return found
+
+
+class _DecidedError(Exception):
+    """Raised to end an episode where its first action is decided."""
+
+
+def choices(config: RunConfig, seeds: Sequence[int], sentence: str) -> dict[str, int]:
+    """How often each action is the first that is decided on; nothing is done."""
+    setting = Setting.load(config.scene)
+    task = setting.understand(sentence)
+    found: list[str] = []
+
+    def decided(action: GroundAction) -> None:
+        found.append(str(action))
+        raise _DecidedError
+
+    with _environment(config, setting) as environment:
+        for seed in seeds:
+            session = Session(_with_seed(config, seed), setting, environment)
+            with suppress(_DecidedError):
+                session.perform(task, Progress(on_act=decided))
+            print(f"{config.affordances} {seed} {found[-1]}", file=sys.stderr, flush=True)
+    return dict(Counter(found))
+
+
+@contextmanager
+def _environment(config: RunConfig, setting: Setting) -> Iterator[Environment]:
     environment = make_environment(
         config.backend,
         setting.domain,
@@ -61,19 +103,10 @@ def episodes(config: RunConfig, seeds: Sequence[int], sentence: str) -> list[Epi
         perception=config.perception,
         shapes_seen=judge_of(config.affordance_source) is not None,
     )
-    found = []
     try:
-        for seed in seeds:
-            steps: list[Step] = []
-            started = time.process_time()
-            session = Session(_with_seed(config, seed), setting, environment)
-            result = session.perform(task, Progress(on_step=steps.append))
-            spent = time.process_time() - started
-            found.append(_judged(seed, result.success, result.total, steps, setting, spent))
-            print(f"{config.affordances} {found[-1]}", file=sys.stderr, flush=True)
+        yield environment
     finally:
         environment.close()
-    return found
 
 
 def _with_seed(config: RunConfig, seed: int) -> RunConfig:
@@ -136,9 +169,10 @@ def main() -> None:
     parser.add_argument("--jitter", type=float, default=0.01)
     parser.add_argument("--perception", default=None)
     parser.add_argument("--affordances", default="learned,default,none")
+    parser.add_argument("--choices", action="store_true", help="tell the first choices only, without acting")
     args = parser.parse_args()
     prepare(DEFAULT_PLANNER, Heuristics.parse(args.heuristics), lambda text: print(text, file=sys.stderr))
-    answer = {}
+    answer: dict[str, object] = {}
     for source in args.affordances.split(","):
         config = RunConfig(
             scene=args.scene,
@@ -151,7 +185,10 @@ def main() -> None:
             affordances=source,
         )
         seeds = range(args.first, args.first + args.seeds)
-        answer[source] = summary(episodes(config, seeds, args.sentence))
+        if args.choices:
+            answer[source] = choices(config, seeds, args.sentence)
+        else:
+            answer[source] = summary(episodes(config, seeds, args.sentence))
     print(json.dumps(answer, indent=2))
 
 
