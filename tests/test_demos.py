@@ -199,7 +199,10 @@ def test_a_demo_that_ends_with_a_report_exits_1(cogarch: Any) -> None:
 @pytest.mark.parametrize(
     ("args", "says"),
     [
-        ("demo sabotge", "unknown demo 'sabotge' (did you mean sabotage?); valid: missing, missing-spare"),
+        (
+            "demo sabotge",
+            "unknown demo 'sabotge' (did you mean sabotage?); valid: by-shape, missing, missing-spare",
+        ),
         ("demo slip --backend gazebo", "unknown backend 'gazebo'; valid: drake, symbolic"),
         ("run go --backend symbolic --event 3:eat:Ham", "unknown kind of event 'eat'; valid: add, empty"),
         (
