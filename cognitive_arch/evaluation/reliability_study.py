@@ -74,6 +74,7 @@ def reliability(options: Options) -> Reproduced:
     )
     results = write_results(options.out, title="Reliability against the published heuristics")
     costs = results.summary.pivot_table(index=POINT, columns="heuristics", values="cost", sort=False)
+    options.on_notice("computing what is possible at best, this takes up to a minute ...")
     bounds = _bounds(settings, costs[list(PUBLISHED)].min(axis=1))
     costs["bound"] = bounds.knowing
     gain = _gain(results.rows, settings.seed)
