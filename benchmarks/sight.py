@@ -43,8 +43,15 @@ def rows(scenes: int = SCENES, jobs: int = 1, told: bool = False) -> Iterator[tu
         those = [look for look in found if moment in (look.moment, "all")]
         mistaken = sum(len(look.wrong) + len(look.overlooked) for look in those)
         atoms = sum(look.atoms for look in those)
-        right = f"{100 * (1 - mistaken / max(1, atoms)):.2f} %"
-        yield f"atoms right, {moment} ({len(those)} looks, {atoms} atoms)", right, ">= 99 %"
+        yield f"atoms right, {moment} ({len(those)} looks, {atoms} atoms)", _share(mistaken, atoms), ">= 99 %"
+    for predicate in sorted({name for look in found for name in look.counts} - {"isHand"}):
+        mistaken = sum(look.mistaken(predicate) for look in found)
+        atoms = sum(look.counts.get(predicate, 0) for look in found)
+        yield f"{predicate} right ({atoms} atoms)", _share(mistaken, atoms), ">= 99 %"
+
+
+def _share(mistaken: int, atoms: int) -> str:
+    return f"{100 * (1 - mistaken / max(1, atoms)):.2f} %"
 
 
 def _tell(seed: int, those: Sequence[Look]) -> None:

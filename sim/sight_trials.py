@@ -6,7 +6,8 @@ A scene is looked at as it lies, then again with some of its things piled up, th
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,13 +30,22 @@ SETTLE = 0.4  # s
 @dataclass(frozen=True)
 class Look:
     """One look: how far off each thing on the table was believed to be (m), the atoms that are believed
-    though not true, those overlooked, and how many are true or believed at all."""
+    though not true, those overlooked, and of each predicate how many are true or believed at all."""
 
     moment: str
     errors: dict[str, float]
     wrong: tuple[str, ...]
     overlooked: tuple[str, ...]
-    atoms: int
+    counts: Mapping[str, int]
+
+    @property
+    def atoms(self) -> int:
+        """How many are true or believed."""
+        return sum(self.counts.values())
+
+    def mistaken(self, predicate: str) -> int:
+        """How many atoms of a predicate are wrong or overlooked."""
+        return sum(atom.startswith(f"{predicate}(") for atom in (*self.wrong, *self.overlooked))
 
 
 def scene_name(seed: int) -> str:
@@ -75,7 +85,7 @@ def _compared(moment: str, environment: DrakeEnvironment, model: WorldModel) -> 
         errors,
         tuple(sorted(map(str, believed - true))),
         tuple(sorted(map(str, true - believed))),
-        len(believed | true),
+        Counter(atom.predicate for atom in believed | true),
     )
 
 
