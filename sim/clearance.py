@@ -15,6 +15,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import BodyIndex
 from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
 
+from cognitive_arch.perception.strangers import Stranger
 from cognitive_arch.world.observation import HANDS
 from sim.assets import TRUNK
 from sim.hands import SIDES, hand_links
@@ -23,6 +24,7 @@ from sim.world import PARK, Joints, World
 
 MARGIN = 0.006  # m that the robot keeps from what it does not mean to touch
 HAND_MARGIN = 0.0015  # m that hands, and what they hold, keep: they work between things that lie close
+STRANGERS = "strangers"  # what the checker calls the shapes of things that are not known
 STEP = 0.08  # rad of the fastest joint between two configurations that are looked at
 
 Pair = tuple[BodyIndex, BodyIndex]
@@ -82,10 +84,13 @@ class Clearance:
         return changed
 
     def look(
-        self, poses: Mapping[str, RigidTransform], held: Mapping[str, tuple[str, RigidTransform]]
+        self,
+        poses: Mapping[str, RigidTransform],
+        held: Mapping[str, tuple[str, RigidTransform]],
+        strangers: Iterable[Stranger] = (),
     ) -> None:
-        """Take in where everything is: `poses` (X_WO) are all that counts as there; `held` maps hands to
-        what they hold and its pose in the hand frame."""
+        """Take in where everything is: `poses` (X_WO) and `strangers` are all that counts as there; `held`
+        maps hands to what they hold and its pose in the hand frame."""
         world, checker = self._world, self._checker
         self._base = world.configuration(world.command)
         for name, body in self._objects.items():
@@ -101,6 +106,11 @@ class Clearance:
             # The thing itself has become part of the hand.
             start = self._objects[name].floating_positions_start()
             self._base[start + 4 : start + 7] = PARK
+        checker.RemoveAllAddedCollisionShapes(STRANGERS)
+        world_body = self._plant.world_body()
+        for stranger in strangers:
+            box, X_WS = drake_shape(stranger.shape), RigidTransform(stranger.pose)
+            checker.AddCollisionShapeToBody(STRANGERS, world_body, box, X_WS)
 
     def _at(self, joints: Joints) -> Joints:
         return self._world.with_joints(self._base, joints)

@@ -16,6 +16,7 @@ from pydrake.math import RigidTransform
 
 from cognitive_arch.domain import Domain, ReachLimits
 from cognitive_arch.footprint import gets_behind
+from cognitive_arch.perception.strangers import Stranger
 from cognitive_arch.perception.top_view import described
 from cognitive_arch.world.observation import HANDS, HandObservation, ObjectObservation, Observation
 from sim.hands import HANDLE, SIDES, finger_names, hand_links
@@ -84,6 +85,10 @@ class Perception(ABC):
 
     def take_hold(self, hand: str, name: str) -> None:  # noqa: B027 (nothing to note where all is known)
         """Note that the fingers of `hand` close around an object at this moment."""
+
+    def strangers(self) -> Mapping[str, Stranger]:
+        """What is seen and not known, by made-up names: it is in the way."""
+        return {}
 
     def picture(self) -> Pixels | None:
         """The last look as an image, with what was made of it; None where there are no eyes."""

@@ -125,7 +125,10 @@ class Robot:
             self.postures[hand] = posture
 
     def top_of(self, name: str) -> float:
-        """Height of an object's upper face, metres."""
+        """Height of an object's upper face, or of a stranger's, metres."""
+        stranger = self.perception.strangers().get(name)
+        if stranger is not None:
+            return float(stranger.pose[2, 3]) + stranger.shape.height / 2
         return float(self.perception.pose(name).translation()[2] + self.world.height(name) / 2)
 
     def look(self, supposed: Mapping[str, tuple[str, RigidTransform]] | None = None) -> None:
@@ -139,7 +142,8 @@ class Robot:
             if name is not None:
                 held[hand] = (name, self.world.hand_pose(hand).inverse() @ self.perception.pose(name))
         poses = {name: self.perception.pose(name) for name in self.perception.names()}
-        self.clearance.look(poses, held | dict(supposed or {}))
+        strangers = self.perception.strangers().values()
+        self.clearance.look(poses, held | dict(supposed or {}), strangers)
 
     def way(self, hand: str, joints: Joints) -> list[Joints] | None:
         """Waypoints of a collision-free way of `hand` to `joints`, or None; as seen by the last `look`.

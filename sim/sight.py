@@ -19,6 +19,7 @@ from cognitive_arch.perception.descriptors import describe
 from cognitive_arch.perception.overlay import draw
 from cognitive_arch.perception.pose import outline_distance
 from cognitive_arch.perception.scene import Classify, SceneView, Sighting, sightings
+from cognitive_arch.perception.strangers import Stranger, Strangers
 from cognitive_arch.perception.top_view import top_view, vectors
 from cognitive_arch.shapes import Shape
 from cognitive_arch.world.observation import HANDS
@@ -54,6 +55,7 @@ class CameraPerception(Perception):
         self._shapes = {name: world.domain.objects[name].shape for name in world.scenario.objects}
         self._table = world.scene.table.height
         self._tracker = Tracker(self._shapes, self._table)
+        self._strangers = Strangers(self._table)
         self._looked, self._felt = -1.0, -1.0
         self._descriptors: dict[str, tuple[tuple[float, ...], tuple[float, ...]]] = {}
         self.image: EyeImage | None = None
@@ -82,6 +84,16 @@ class CameraPerception(Perception):
             found = self._tracker.update(
                 detections, self._senses(), lambda name, pose: _judge(image, self._shapes[name], pose)
             )
+        self._name(detections, found)
+        if not known:
+            self._strangers.update(
+                [one.region.surface for n, one in enumerate(self.sightings) if n not in self._names],
+                [(self._shapes[name], track.pose) for name, track in self._tracker.tracks.items()],
+                lambda shape, pose: _judge(image, shape, pose),
+            )
+
+    def _name(self, detections: Sequence[Detection], found: Mapping[str, int]) -> None:
+        """Note what sightings are taken to be, and the shapes of what is seen well."""
         glimpsed = {index: one.best[0] for index, one in enumerate(detections) if one.telling}
         self._names = glimpsed | {index: name for name, index in found.items()}
         held = {self._tracker.held(hand) for hand in HANDS}
@@ -133,6 +145,9 @@ class CameraPerception(Perception):
     def descriptors(self, name: str) -> tuple[tuple[float, ...], tuple[float, ...]]:
         return self._descriptors.get(name, ((), ()))
 
+    def strangers(self) -> Mapping[str, Stranger]:
+        return self._strangers.named()
+
     def picture(self) -> Pixels | None:
         """See `Perception.picture`: names of what is seen, and crosses for what is remembered."""
         if self.image is None:
@@ -169,6 +184,7 @@ class CameraPerception(Perception):
     def save(self) -> dict[str, Any]:
         return {
             "tracker": self._tracker.to_json(),
+            "strangers": self._strangers.to_json(),
             "looked": self._looked,
             "descriptors": {
                 name: [list(part) for part in parts] for name, parts in self._descriptors.items()
@@ -177,6 +193,7 @@ class CameraPerception(Perception):
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         self._tracker.restore(saved["tracker"])
+        self._strangers.restore(saved["strangers"])
         self._descriptors = {
             str(name): (tuple(map(float, desc)), tuple(map(float, tooldesc)))
             for name, (desc, tooldesc) in saved["descriptors"].items()

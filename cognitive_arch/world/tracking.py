@@ -330,7 +330,7 @@ class Tracker:
         if any((row["hand"] is None) != (row["in_hand"] is None) for row in rows):
             raise ValueError("a thing is held without a place in the hand, or the other way round")
         for pose in (row[key] for row in rows for key in ("pose", "in_hand") if row[key] is not None):
-            _check_pose(np.array(pose, float))
+            check_pose(np.array(pose, float))
         self.tracks = {
             name: Track(
                 np.array(row["pose"], float).reshape(4, 4),
@@ -365,7 +365,8 @@ def _yaw(pose: Pose) -> float:
     return math.atan2(pose[1, 0], pose[0, 0])
 
 
-def _check_pose(pose: Pose) -> None:
+def check_pose(pose: Pose) -> None:
+    """Raise `ValueError` for what is no pose."""
     if pose.shape != (4, 4) or not np.isfinite(pose).all():
         raise ValueError("a pose is a matrix of 4 by 4 finite numbers")
     if not np.allclose(pose[:3, :3] @ pose[:3, :3].T, np.eye(3), atol=1e-6):

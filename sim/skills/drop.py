@@ -6,9 +6,10 @@ import itertools
 from collections.abc import Iterator
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cognitive_arch.execution.environment import FailureReason
-from sim.footprint import disc, footprint, outer_radius, smallest_gap
+from sim.footprint import disc, footprint, outer_radius, slab, smallest_gap
 from sim.kinematics import HandTarget
 from sim.robot import Robot
 from sim.skills.base import looked_for
@@ -52,8 +53,9 @@ def free_places(robot: Robot, name: str, hand: str) -> list[tuple[float, float]]
         if other != name
         for capsule in footprint(shapes[other].shape, robot.perception.pose(other))
     ]
-    shape = shapes[name].shape
-    own = outer_radius(shape)
+    for stranger in robot.perception.strangers().values():
+        others += slab(stranger.shape, RigidTransform(stranger.pose))
+    own = outer_radius(shapes[name].shape)
     places = []
     for x, y in itertools.product(*PLACES):
         place = (float(x), sign * float(y))

@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from cognitive_arch.execution.environment import FailureReason
 from cognitive_arch.shapes import ToolShape
 from cognitive_arch.world.observation import HANDS
-from sim.footprint import Capsule, Point, disc, footprint, on_table, smallest_gap, tool_footprint
+from sim.footprint import Capsule, Point, disc, footprint, on_table, slab, smallest_gap, tool_footprint
 from sim.hands import FINGER_WIDTH, STROKE
 from sim.kinematics import HandTarget, Vector
 from sim.robot import Robot
@@ -169,13 +169,15 @@ def unusable(robot: Robot, obj: str, tool: str, hand: str) -> FailureReason | No
 
 
 def obstacles(robot: Robot, *but: str) -> dict[str, tuple[Capsule, ...]]:
-    """What everything else covers of the table: what lies on it, by name."""
+    """What everything else covers of the table: what lies on it, known or not, by name."""
     held = {robot.perception.held(hand) for hand in HANDS}
-    return {
+    known = {
         name: footprint(robot.domain.objects[name].shape, robot.perception.pose(name))
         for name in robot.perception.names()
         if name not in but and name not in held
     }
+    strangers = robot.perception.strangers().items()
+    return known | {name: slab(one.shape, RigidTransform(one.pose)) for name, one in strangers}
 
 
 def discomfort(tool: HeldTool, sweep: Sweep) -> float:
