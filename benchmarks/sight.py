@@ -44,6 +44,8 @@ def rows(scenes: int = SCENES, jobs: int = 1, told: bool = False) -> Iterator[tu
         mistaken = sum(len(look.wrong) + len(look.overlooked) for look in those)
         atoms = sum(look.atoms for look in those)
         yield f"atoms right, {moment} ({len(those)} looks, {atoms} atoms)", _share(mistaken, atoms), ">= 99 %"
+    strangers = sum(look.strangers for look in found)
+    yield "seen and not known, where all there is is known", f"{strangers} things", ""
     for predicate in sorted({name for look in found for name in look.counts} - {"isHand"}):
         mistaken = sum(look.mistaken(predicate) for look in found)
         atoms = sum(look.counts.get(predicate, 0) for look in found)
@@ -56,6 +58,8 @@ def _share(mistaken: int, atoms: int) -> str:
 
 def _tell(seed: int, those: Sequence[Look]) -> None:
     for look in those:
+        if look.strangers:
+            print(f"    scene {seed}, {look.moment}: {look.strangers} seen and not known", flush=True)
         if look.wrong or look.overlooked:
             wrong, overlooked = (", ".join(atoms) for atoms in (look.wrong, look.overlooked))
             print(

@@ -30,13 +30,15 @@ SETTLE = 0.4  # s
 @dataclass(frozen=True)
 class Look:
     """One look: how far off each thing on the table was believed to be (m), the atoms that are believed
-    though not true, those overlooked, and of each predicate how many are true or believed at all."""
+    though not true, those overlooked, of each predicate how many are true or believed at all, and how
+    many things were seen that are none of those that are there."""
 
     moment: str
     errors: dict[str, float]
     wrong: tuple[str, ...]
     overlooked: tuple[str, ...]
     counts: Mapping[str, int]
+    strangers: int
 
     @property
     def atoms(self) -> int:
@@ -86,6 +88,7 @@ def _compared(moment: str, environment: DrakeEnvironment, model: WorldModel) -> 
         tuple(sorted(map(str, believed - true))),
         tuple(sorted(map(str, true - believed))),
         Counter(atom.predicate for atom in believed | true),
+        len(environment.robot.perception.strangers()),
     )
 
 
