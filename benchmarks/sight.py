@@ -1,7 +1,8 @@
 """How well the robot knows its table by its eyes: `python -m benchmarks.sight [--scenes 200] [--jobs 2]`.
 
 Random scenes of both domains, looked at as they lie, piled up, and with a thing in a hand
-(`sim/sight_trials.py`): how far off things are, and how many atoms are right. About five seconds a scene;
+(`sim/sight_trials.py`): how far off things are, and how many atoms are right. With `--eyes
+noise` the sensors have noise, with `--eyes shadows` things cast hard shadows, too. About six seconds a scene;
 nothing here can fail a test.
 """
 
@@ -11,26 +12,36 @@ import argparse
 import multiprocessing
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 
 import numpy as np
 
+from sim.eyes import IDEAL, SENSOR
 from sim.sight_trials import Look, looks
 
 SCENES = 200
+EYES = {  # noise of the sensors, and whether things cast shadows
+    "ideal": (IDEAL, False),
+    "noise": (SENSOR, False),
+    "shadows": (SENSOR, True),
+}
 MOMENTS = ("lying", "piled", "in hand")
 
 
-def seen(seed: int) -> list[Look]:
-    """The looks at one scene."""
-    return list(looks(seed))
+def seen(eyes: str, seed: int) -> list[Look]:
+    """The looks at one scene, with one of `EYES`."""
+    noise, shadows = EYES[eyes]
+    return list(looks(seed, noise, shadows))
 
 
-def rows(scenes: int = SCENES, jobs: int = 1, told: bool = False) -> Iterator[tuple[str, str, str]]:
+def rows(
+    scenes: int = SCENES, jobs: int = 1, told: bool = False, eyes: str = "ideal"
+) -> Iterator[tuple[str, str, str]]:
     """What was measured: what, how much, and the goal where there is one."""
     # Fresh processes: forked ones would share the state of Drake.
     with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         found = []
-        for seed, those in enumerate(pool.map(seen, range(scenes))):
+        for seed, those in enumerate(pool.map(partial(seen, eyes), range(scenes))):
             found += those
             if told:
                 _tell(seed, those)
@@ -73,8 +84,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0] if __doc__ else None)
     parser.add_argument("--scenes", type=int, default=SCENES)
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--eyes", choices=EYES, default="ideal")
     options = parser.parse_args(arguments)
-    for what, measured, goal in rows(options.scenes, options.jobs, told=True):
+    for what, measured, goal in rows(options.scenes, options.jobs, told=True, eyes=options.eyes):
         print(f"{what:<66} {measured:>12}   {goal}".rstrip(), flush=True)
 
 

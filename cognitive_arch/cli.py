@@ -49,7 +49,7 @@ VideoOption = Annotated[bool, typer.Option("--video", help="Make a video of the 
 PerceptionOption = Annotated[
     str | None,
     typer.Option(
-        help="How the robot knows its table: camera (drake's own way) or oracle (the simulation tells)."
+        help="How the robot knows its table: camera (drake's own way), noisy-camera, oracle (the simulation)."
     ),
 ]
 AffordancesOption = Annotated[

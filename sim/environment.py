@@ -18,7 +18,7 @@ from cognitive_arch.relational.symbols import GroundAction
 from cognitive_arch.runlog.trajectory import TRAJECTORY, Trajectory
 from cognitive_arch.world.observation import Observation
 from sim.clearance import Clearance
-from sim.eyes import Eyes
+from sim.eyes import IDEAL, SENSOR, EyeNoise, Eyes
 from sim.hands import Posture
 from sim.kinematics import Kinematics
 from sim.meddling import disturb
@@ -34,7 +34,7 @@ from sim.skills.base import let_go_of_lost, unusable_arguments
 from sim.world import World
 
 SETTLE = 0.3  # s before the first look
-FORMAT = 2  # of saved states
+FORMAT = 3  # of saved states
 ARTIFACTS = (".png", ".npz", ".html", ".mp4")
 
 
@@ -43,7 +43,8 @@ class DrakeEnvironment:
 
     `noise` maps `left`, `right`, `pull` and `push` to noise levels, or is a composition of its own.
     `record` makes pictures, a trajectory and a Meshcat recording of an episode, with `video` a video, too.
-    `reach` is `kinematic`, or `published` for the constants of the scene.
+    `reach` is `kinematic`, or `published` for the constants of the scene. `perception` is one of
+    `PERCEPTIONS`; the eyes' sensors have `eye_noise` where that is given, and things cast `shadows` or not.
     """
 
     skills = frozenset(SKILLS)
@@ -60,6 +61,8 @@ class DrakeEnvironment:
         friction: float = FRICTION,
         reach: str = "kinematic",
         perception: str = "camera",
+        eye_noise: EyeNoise | None = None,
+        shadows: bool = False,
     ) -> None:
         self._domain = domain
         self._scene = scene
@@ -74,8 +77,9 @@ class DrakeEnvironment:
         self._stage = Stage(domain, scene) if record else None
         self._video = video
         self._eyes, self._classify = None, None
-        if perception == "camera":
-            self._eyes = Eyes(domain, scene)
+        if perception != "oracle":
+            noise_of_eyes = eye_noise or (SENSOR if perception == "noisy-camera" else IDEAL)
+            self._eyes = Eyes(domain, scene, shadows=shadows, noise=noise_of_eyes)
             self._classify = load_recogniser(domain.name).classify
         self._robot: Robot | None = None
         self._folder: Path | None = None
@@ -92,18 +96,18 @@ class DrakeEnvironment:
         rng = np.random.default_rng(seed)
         self.world.reset(jittered(self._scene, self._jitter, rng, self._domain))
         self.recorder.restart()
-        self._robot = self._new_robot(rng)
+        self._robot = self._new_robot(rng, seed)
         self._robot.noise.begin()
         self.world.hold(SETTLE)
         return self.observe()
 
-    def _new_robot(self, rng: np.random.Generator) -> Robot:
+    def _new_robot(self, rng: np.random.Generator, seed: int = 0) -> Robot:
         noise = EpisodeNoise(self._noise, self.world, rng)
         truth = OraclePerception(self.world, self._kinematics, self._reach)
         perception: Perception = truth
         if self._eyes is not None and self._classify is not None:
             perception = CameraPerception(
-                self.world, self._kinematics, self._reach, self._eyes, self._classify
+                self.world, self._kinematics, self._reach, self._eyes, self._classify, seed
             )
         return Robot(
             self._domain,

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,7 @@ SAMPLES = 5  # along each side of a thing
 
 
 class CameraPerception(Perception):
-    """The robot's own view of a world. `classify` names what it sees."""
+    """The robot's own view of a world. `classify` names what it sees; `seed` is that of the eyes' noise."""
 
     def __init__(
         self,
@@ -49,9 +50,11 @@ class CameraPerception(Perception):
         limits: ReachLimits | None,
         eyes: Eyes,
         classify: Classify,
+        seed: int = 0,
     ) -> None:
         super().__init__(world.domain, kinematics, limits)
         self._world, self._eyes, self._classify = world, eyes, classify
+        self._seed = seed
         self._shapes = {name: world.domain.objects[name].shape for name in world.scenario.objects}
         self._table = world.scene.table.height
         self._tracker = Tracker(self._shapes, self._table)
@@ -74,8 +77,12 @@ class CameraPerception(Perception):
         if known and self.image is not None:
             return
         self._looked = self._world.time
-        self.image = image = self._eyes.look(self._world.positions())
+        # Noise depends on the moment, so that whoever goes on with a run sees what it would have seen.
+        rng = np.random.default_rng([self._seed, round(1000 * self._world.time)])
+        self.image = self._eyes.look(self._world.positions(), rng)
+        image = self.image
         view = SceneView(image.color, image.depth, image.own, image.camera, self._table)
+        image = replace(image, depth=view.depth)
         self.sightings = sightings(view, self._classify, self._shapes)
         detections = [_detection(sighting) for sighting in self.sightings]
         if known:  # what a restored robot saw last is what it sees, and what it made of that is restored
@@ -186,6 +193,7 @@ class CameraPerception(Perception):
             "tracker": self._tracker.to_json(),
             "strangers": self._strangers.to_json(),
             "looked": self._looked,
+            "seed": self._seed,
             "descriptors": {
                 name: [list(part) for part in parts] for name, parts in self._descriptors.items()
             },
@@ -198,9 +206,12 @@ class CameraPerception(Perception):
             str(name): (tuple(map(float, desc)), tuple(map(float, tooldesc)))
             for name, (desc, tooldesc) in saved["descriptors"].items()
         }
+        self._seed = int(saved["seed"])
         self._looked, self._felt = float(saved["looked"]), -1.0
         if not math.isfinite(self._looked):
             raise ValueError("the time of the last look is no number")
+        if self._seed < 0:
+            raise ValueError("the seed of the eyes' noise is negative")
 
 
 def _detection(sighting: Sighting) -> Detection:

@@ -19,6 +19,7 @@ from cognitive_arch.scenes import load_scene
 from cognitive_arch.world.anchoring import WorldModel
 from cognitive_arch.world.observation import HANDS, Observation
 from sim.environment import DrakeEnvironment
+from sim.eyes import IDEAL, EyeNoise
 
 DOMAINS = ("sandwich", "toys")
 PILE = 3  # things on top of each other at most
@@ -55,10 +56,10 @@ def scene_name(seed: int) -> str:
     return f"random:{seed}:{DOMAINS[seed % len(DOMAINS)]}"
 
 
-def looks(seed: int) -> Iterator[Look]:
+def looks(seed: int, eye_noise: EyeNoise = IDEAL, shadows: bool = False) -> Iterator[Look]:
     """Three looks at the random scene of a seed."""
     scene = load_scene(scene_name(seed))
-    environment = DrakeEnvironment(load_domain(scene.domain), scene)
+    environment = DrakeEnvironment(load_domain(scene.domain), scene, eye_noise=eye_noise, shadows=shadows)
     rng = np.random.default_rng(seed)
     model = WorldModel()
     try:

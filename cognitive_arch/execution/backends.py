@@ -19,7 +19,7 @@ REACH_MODELS: Mapping[str, tuple[str, ...]] = {  # what each backend can tell re
     "symbolic": ("published",),
 }
 PERCEPTIONS: Mapping[str, tuple[str, ...]] = {  # how the robot knows what is where, each one's own way first
-    "drake": ("camera", "oracle"),
+    "drake": ("camera", "noisy-camera", "oracle"),
     "symbolic": ("oracle",),
 }
 
@@ -32,7 +32,7 @@ def affordance_source(backend: str, perception: str | None = None, asked: str | 
     """One of `AFFORDANCES`, or the file of a model of one's own (.json). None is `learned` for a robot that
     sees, `default` for others. Raises `ConfigError`."""
     if asked is None:
-        return "learned" if perception_source(backend, perception) == "camera" else "default"
+        return "default" if perception_source(backend, perception) == "oracle" else "learned"
     if asked not in AFFORDANCES and not asked.endswith((".json", ".json.gz")):
         known = unknown("source of affordances", asked, AFFORDANCES)
         raise ConfigError(f"{known}, or the file of `cogarch learn networks` (.json)")
@@ -46,7 +46,8 @@ def reach_model(backend: str, asked: str | None = None) -> str:
 
 
 def perception_source(backend: str, asked: str | None = None) -> str:
-    """How the robot knows its surroundings: `camera` by its eyes, `oracle` by the simulation itself. None is
+    """How the robot knows its surroundings: `camera` by its eyes, `noisy-camera` by eyes with
+    the noise of a real camera, `oracle` by the simulation itself. None is
     the backend's own way. Raises `ConfigError`."""
     return _choice("perception", PERCEPTIONS, backend, asked)
 

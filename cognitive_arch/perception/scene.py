@@ -24,6 +24,7 @@ Mask = NDArray[np.bool_]  # (height, width)
 Classify = Callable[[NDArray[np.uint8], Mask], list[tuple[str, float]]]
 UNKNOWN = "unknown"
 
+SMOOTH, SMOOTH_DEPTH = 3, 5  # pixels; side of the square of which the median counts
 STEP = 0.006  # m of height between neighbouring pixels of different things
 SHADE = 0.02  # of chromaticity between neighbouring pixels of different things
 DARK = 120.0  # sum of the three colours below which chromaticity means less
@@ -82,7 +83,7 @@ class Sighting:
 
 class SceneView:
     """One look at a table of a known height (m): colour (height, width, 3), depth (height, width) in metres,
-    and the robot's own body in it, (height, width)."""
+    and the robot's own body in it, (height, width). The noise of single pixels is taken from the depth."""
 
     def __init__(
         self,
@@ -92,8 +93,10 @@ class SceneView:
         camera: Camera,
         table: float,
     ) -> None:
-        self.color, self.depth, self.own, self.camera, self.table = color, depth, own, camera, table
-        self.points = camera.points(depth)
+        self.color, self.own, self.camera, self.table = color, own, camera, table
+        # Edges stay where they are, corners lose a pixel.
+        self.depth = np.asarray(cv2.medianBlur(np.asarray(depth, np.float32), SMOOTH_DEPTH), np.float32)
+        self.points = camera.points(self.depth)
 
     def raised(self) -> Mask:
         """What rises above the table and is not the robot itself."""
@@ -118,7 +121,8 @@ class SceneView:
 
     def _steps(self, rows: slice, columns: slice) -> Mask:
         """Where colour or height differ from the pixel to the left or above."""
-        color = self.color[rows, columns].astype(np.float32)
+        # On a dark side two grey levels of noise are as large as a step.
+        color = cv2.medianBlur(self.color[rows, columns], SMOOTH).astype(np.float32)
         total = color.sum(axis=2) + 1e-3
         chroma = color[:, :, :2] / total[:, :, None]
         lit = np.minimum(total / DARK, 1.0)

@@ -25,6 +25,7 @@ SHORTEST = 0.010  # m that it is long at least
 ROUND = 0.008  # m around a known thing that still belong to it
 OWN = 0.5  # of its places: where more are on a known thing, it is a piece of that
 HIGHEST = 99.0  # percentile of heights that counts as its upper side
+MOST = (0.5, 99.5)  # percentiles of places along a side between which the box is: the rest is noise
 SHRUNK = 0.9  # of the area that it covered: below, a part of it is hidden
 ANGLES = np.arange(0.0, math.pi / 2, math.radians(3))  # of the box's sides, to choose from
 
@@ -38,12 +39,12 @@ class Stranger:
 
 
 def enclosing(surface: NDArray[np.float64], bottom: float) -> Stranger:
-    """The smallest upright box around places (n, 3), from a height (m) upwards."""
+    """The smallest upright box around nearly all of places (n, 3), from a height (m) upwards."""
     best: tuple[float, float, NDArray[np.float64], NDArray[np.float64]] | None = None
     for angle in ANGLES:
         c, s = math.cos(angle), math.sin(angle)
         turned = surface[:, :2] @ np.array(((c, -s), (s, c)))
-        low, high = turned.min(axis=0), turned.max(axis=0)
+        low, high = np.percentile(turned, MOST, axis=0)
         area = float(np.prod(high - low))
         if best is None or area < best[0]:
             best = area, float(angle), low, high
