@@ -56,7 +56,7 @@ def stranger(domain: Domain, rng: np.random.Generator, *, test: bool) -> Thing:
     """
     specs = [domain.objects[name] for name in sorted(domain.objects)]
     # Shapes are harder to learn than colours: most to learn from have a colour of the domain.
-    kind = rng.integers(3) if test else rng.choice(3, p=(0.25, 0.5, 0.25))
+    kind = rng.integers(3) if test else rng.choice(3, p=(0.2, 0.65, 0.15))
     spec = specs[rng.integers(len(specs))]
     if kind == 0:
         return Thing(_parts(spec.shape), _other_color(specs, rng, test), spec.shape.height)
@@ -156,6 +156,80 @@ def _rod(rng: np.random.Generator) -> Made:
     return ((lying, Cylinder(radius, length)),), 2 * radius
 
 
+def _star(rng: np.random.Generator) -> Made:
+    """Three, five or six arms; four would be a cross."""
+    arms = (3, 5, 6)[rng.integers(3)]
+    long, wide, high = rng.uniform(0.025, 0.06), rng.uniform(0.010, 0.024), rng.uniform(0.008, 0.03)
+    parts = []
+    for turn in np.arange(arms) * 2 * math.pi / arms:
+        place = [long / 2 * math.cos(turn), long / 2 * math.sin(turn), 0]
+        parts.append((RigidTransform(RollPitchYaw(0, 0, turn), place), Box(long, wide, high)))
+    return tuple(parts), high
+
+
+def _bracket(rng: np.random.Generator) -> Made:
+    """A bar with another one or two standing off it: T, U, or in between."""
+    long, short, wide = rng.uniform(0.05, 0.11), rng.uniform(0.02, 0.07), rng.uniform(0.010, 0.022)
+    high = rng.uniform(0.01, 0.025)
+    parts = [(RigidTransform(), Box(long, wide, high))]
+    for place in rng.uniform(-0.5, 0.5, rng.integers(1, 3)):
+        X_OS = RigidTransform([place * (long - wide), (wide + short) / 2, 0])
+        parts.append((X_OS, Box(wide, short, high)))
+    return tuple(parts), high
+
+
+def _chain(rng: np.random.Generator) -> Made:
+    """Three or four balls in a bent row."""
+    radius, turn = rng.uniform(0.010, 0.022), 0.0
+    place, parts = np.zeros(3), []
+    for _ in range(rng.integers(3, 5)):
+        parts.append((RigidTransform(place), Sphere(radius)))
+        turn += rng.normal(0, 0.5)
+        place = place + radius * rng.uniform(1.1, 2.0) * np.array([math.cos(turn), math.sin(turn), 0])
+    middle = place / 2
+    return tuple((RigidTransform(X_OP.translation() - middle), solid) for X_OP, solid in parts), 2 * radius
+
+
+def _pebble(rng: np.random.Generator) -> Made:
+    """Flat and round from above."""
+    a = rng.uniform(0.018, 0.045)
+    b, c = a * rng.uniform(0.75, 1.0), a * rng.uniform(0.25, 0.65)
+    return ((RigidTransform(), Ellipsoid(a, b, c)),), 2 * c
+
+
+def _cone(rng: np.random.Generator) -> Made:
+    """A staircase of discs that get smaller upwards."""
+    radius, height = rng.uniform(0.022, 0.045), rng.uniform(0.02, 0.07)
+    steps = int(rng.integers(3, 7))
+    point = rng.uniform(0.1, 0.5)
+    step = height / steps
+    sizes = radius * np.linspace(1, point, steps)
+    parts = [
+        (RigidTransform([0, 0, (n + 0.5) * step - height / 2]), Cylinder(float(size), step))
+        for n, size in enumerate(sizes)
+    ]
+    return tuple(parts), height
+
+
+def _prism(rng: np.random.Generator) -> Made:
+    """With six or eight corners."""
+    count = int(rng.integers(2, 4))
+    size, height = rng.uniform(0.03, 0.08), rng.uniform(0.008, 0.06)
+    solid = Box(size, size if count == 2 else size / math.sqrt(3), height)
+    turns = np.arange(count) * math.pi / (4 if count == 2 else 3)
+    return tuple((RigidTransform(RollPitchYaw(0, 0, turn), [0, 0, 0]), solid) for turn in turns), height
+
+
+def _mushroom(rng: np.random.Generator) -> Made:
+    """A round head on a foot."""
+    head, foot, high = rng.uniform(0.016, 0.035), rng.uniform(0.008, 0.03), rng.uniform(0.01, 0.04)
+    flat = head * rng.uniform(0.6, 1.0)
+    height = high + flat
+    X_OF = RigidTransform([0, 0, high / 2 - height / 2])
+    X_OH = RigidTransform([0, 0, high - height / 2])
+    return ((X_OF, Cylinder(foot, high)), (X_OH, Ellipsoid(head, head, flat))), height
+
+
 def _egg(rng: np.random.Generator) -> Made:
     a, b, c = rng.uniform(0.03, 0.06), rng.uniform(0.012, 0.025), rng.uniform(0.012, 0.025)
     return ((RigidTransform(), Ellipsoid(a, b, c)),), 2 * c
@@ -188,12 +262,19 @@ def _dumbbell(rng: np.random.Generator) -> Made:
 LEARNT_KINDS: dict[str, Callable[[np.random.Generator], Made]] = {
     "angle": _angle,
     "box": _box,
+    "bracket": _bracket,
+    "chain": _chain,
+    "cone": _cone,
     "cylinder": _cylinder,
     "heap": _heap,
+    "mushroom": _mushroom,
+    "pebble": _pebble,
     "plank": _plank,
+    "prism": _prism,
     "ramp": _ramp,
     "rod": _rod,
     "sphere": _ball,
+    "star": _star,
     "tower": _tower,
 }
 TEST_KINDS: dict[str, Callable[[np.random.Generator], Made]] = {

@@ -32,7 +32,8 @@ TABLE_TOP = -0.096  # m
 PLACES_X, PLACES_Y = (-0.80, -0.22), (-0.34, 0.34)  # m
 APART = 0.085  # m between the middles of things beside each other
 STRANGERS = 8  # in every room
-VIEWS_PER_ROOM = 5
+VIEWS_PER_ROOM = 5  # to test with
+VIEWS_TO_LEARN = 2  # in a room: few, so that there are many strangers
 AWAY = RigidTransform([0.0, 0.0, -9.0])
 MIN_PIXELS = 60
 MARGIN = 3  # pixels around a thing that are kept of the picture
@@ -147,9 +148,9 @@ def examples(
     domain: Domain, views: int, rng: np.random.Generator, *, test: bool = False
 ) -> Iterator[Example]:
     """Every thing in `views` pictures; with `test` strangers of kinds and hues that are not learnt from."""
-    room = None
+    room, per_room = None, VIEWS_PER_ROOM if test else VIEWS_TO_LEARN
     for view in range(views):
-        if view % VIEWS_PER_ROOM == 0 or room is None:
+        if view % per_room == 0 or room is None:
             things = {name: known_thing(spec) for name, spec in sorted(domain.objects.items())}
             things |= {f"{UNKNOWN}_{n}": stranger(domain, rng, test=test) for n in range(STRANGERS)}
             room = _Room(things, rng)

@@ -16,7 +16,8 @@ from cognitive_arch.perception.recognition_training import calibrate, describe, 
 
 VARIANTS = 2  # in which every view is learnt from besides itself
 VIEWS = (20, 20_000)  # that may be asked for
-HELD_OUT = 8  # views to learn from for every one to test with, and for every one to calibrate with
+HELD_OUT = 8  # views to learn from for every one to test with
+WEIGHED = 4  # the same for those to calibrate with
 TEST_SEED, CALIBRATION_SEED = 99, 55  # added to the seed
 TO_LEARN = 0.5  # of a stranger must be in view to learn from it: a part of one may look like anything
 MOSTLY = 0.8  # of a thing is in view where it counts as a view to recognise it from
@@ -50,9 +51,9 @@ def learn_objects(
     command = f"cogarch learn objects --domain {domain_name} --views {views} --seed {seed}"
     told = {"domain": domain_name, "command": command, "views": views, "seed": seed, "looks": digest(domain)}
     recogniser = fit(learnt, sorted(domain.objects), told, seed)
-    held_out = -(-views // HELD_OUT)
-    progress(f"weighing known against unknown on {held_out} views")
-    weighed = render(domain, held_out, np.random.default_rng(seed + CALIBRATION_SEED))
+    held_out, calibrating = -(-views // HELD_OUT), -(-views // WEIGHED)
+    progress(f"weighing known against unknown on {calibrating} views")
+    weighed = render(domain, calibrating, np.random.default_rng(seed + CALIBRATION_SEED))
     chosen = ((e.image, e.mask, e.name) for e in weighed if e.visible >= MOSTLY)
     calibrate(recogniser, describe(chosen, np.random.default_rng(seed)))
     progress(f"testing on {held_out} views with strangers of other kinds")

@@ -3,7 +3,8 @@
 Colours are taken as shares of red and green in the whole, where the region is lit: brighter light leaves
 them as they are. Shapes are told by ratios, of the whole region and of its lit part, which for most things
 is their upper side. The one number that is not free of the light is how bright the lit part is, for that
-is all that tells grey from black or white.
+is all that tells grey from black or white. How shade changes from pixel to pixel tells flat sides, which
+meet at edges, from round ones.
 """
 
 from __future__ import annotations
@@ -30,6 +31,9 @@ SHADES = (0.05, 0.25, 0.50, 0.75)
 DARK = 6.0  # grey levels added to colours before they are divided: the darkest ones are mostly rounding
 SAMPLE = 400  # pixels that tell how much the colour varies
 OUTLINE_SAMPLE = 1200  # pixels that tell its form
+SLOPE_SAMPLE = 2000  # pixels that tell how its shade changes
+INNER = np.ones((5, 5), np.uint8)  # pixels no nearer to the border than half of this
+STEEP = 0.05  # of the brightest shade from one pixel to the next: more is an edge
 _SHAPE = (
     *("roundness", "filling", "convexity", "squareness", "slimness", "circularity"),
     *("spread", "lopsided", "triangular", "square", "two_ended"),
@@ -43,6 +47,7 @@ FEATURES = (
     *_SHAPE,
     *(f"lit_{name}" for name in _SHAPE),
     *("lit_right", "lit_down"),
+    *("slope", "slope_50", "slope_90", "edges"),
 )
 
 # Regions are small: handing them to other threads takes up to ten times as long as doing it here.
@@ -82,7 +87,27 @@ def appearance(image: Image, mask: Mask) -> NDArray[np.float32]:
     numbers += [*_shape(region, of_all), *_shape(lit, of_lit)]
     size = math.sqrt(of_all[kernels.COUNT])
     numbers += [(of_lit[axis] - of_all[axis]) / size for axis in (kernels.X, kernels.Y)]
+    numbers += _slopes(tones, region, shades[-1] + 1, size)
     return np.array(numbers, dtype=np.float32)
+
+
+def _slopes(
+    tones: NDArray[np.uint8], region: NDArray[np.uint8], brightest: float, size: float
+) -> list[float]:
+    """By how much of the brightest shade it would change across the region, `size` pixels, if it changed as
+    it does from pixel to pixel inside: mean, median, ninth decile; and the share of pixels at edges."""
+    smooth = np.asarray(cv2.GaussianBlur(tones, (3, 3), 0), np.uint8)
+    inner = np.asarray(cv2.erode(region, INNER, borderValue=0), np.uint8)
+    counts = np.empty(kernels.SLOPES, np.int64)
+    kernels.slopes(smooth, inner, SLOPE_SAMPLE, counts)
+    below = counts.cumsum()
+    if not below[-1]:  # too slim to have an inside
+        return [0.0] * 4
+    unit = size / kernels.SLOPE_UNIT / brightest
+    mean = float(counts @ np.arange(kernels.SLOPES)) / float(below[-1])
+    median, decile = below.searchsorted(np.array([0.5, 0.9]) * below[-1]).tolist()
+    gentle = below[min(int(STEEP * brightest * kernels.SLOPE_UNIT), kernels.SLOPES - 1)] / below[-1]
+    return [unit * mean, unit * median, unit * decile, 1 - float(gentle)]
 
 
 def _percentiles(counts: NDArray[np.int64]) -> list[float]:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cognitive_arch import resources
-from cognitive_arch.domain import Domain, load_domain
+from cognitive_arch.domain import Domain, domain_names, load_domain
 from cognitive_arch.errors import PerceptionError, one_line
 from cognitive_arch.perception.appearance import COLORS, FEATURES, Image, Mask, appearance, kernels
 
@@ -165,7 +165,9 @@ class ObjectRecogniser:
                 arrays = {name: data[name] for name in data.files}
             told = json.loads(str(arrays["told"]))
             if told.pop("format") != FORMAT or tuple(map(str, arrays["features"])) != FEATURES:
-                raise PerceptionError(f"'{one_line(path)}' was made by another version; {_advice('NAME')}")
+                raise PerceptionError(
+                    f"'{one_line(path)}' was made by another version; {_advice(_owner(path))}"
+                )
             forest = {field.name: arrays[f"forest_{field.name}"] for field in fields(Forest)}
             return cls(
                 names=tuple(map(str, arrays["names"])),
@@ -177,8 +179,14 @@ class ObjectRecogniser:
             raise
         except Exception as error:  # a broken archive fails in as many ways as there are bytes
             raise PerceptionError(
-                f"'{one_line(path)}' is no recogniser ({one_line(error)}); {_advice('NAME')}"
+                f"'{one_line(path)}' is no recogniser ({one_line(error)}); {_advice(_owner(path))}"
             ) from None
+
+
+def _owner(path: Path) -> str:
+    """The domain whose folder a recogniser is in, or those that there are."""
+    names = domain_names()
+    return path.parent.name if path.parent.name in names else f"NAME ({', '.join(names)})"
 
 
 def _advice(domain: str) -> str:

@@ -25,7 +25,7 @@ KEPT_PIXELS = 50  # of a region that was cut
 CUT = 0.25  # share of the variants that something hides a part of
 SURE, LIMIT_FACTOR = 0.998, 1.15  # this share of an object's examples is within its limit; and some more room
 KNOWN_RIGHT = (
-    0.994  # share of known things that must keep their name; then as few strangers get one as can be
+    0.996  # share of known things that must keep their name; then as few strangers get one as can be
 )
 READINESS = np.linspace(-4.0, 1.0, 51)  # of which one is added to the score of unknown
 RIDGE = 1e-5  # added to variances of colours: what never varied is not known to the last digit

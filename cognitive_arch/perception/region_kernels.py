@@ -16,6 +16,9 @@ FORMS = 5
 RED_VARIES, GREEN_VARIES, TONE, TONE_VARIES = range(4)
 """Where `look` puts what of how the lit part varies: standard deviations but for the mean `TONE`."""
 
+SLOPES, SLOPE_UNIT = 1024, 8
+"""Of what `slopes` counts: how many classes, and how many of them make one grey level per pixel."""
+
 _kernel = numba.njit(cache=True, nogil=True, error_model="numpy")
 _part = numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True)
 
@@ -55,6 +58,26 @@ def look(colors, tones, region, least, dark, samples, lit, found, varies):  # ty
     count = found[1, COUNT]
     varies[TONE] = tone_sum / count
     varies[TONE_VARIES] = math.sqrt(max(0.0, tone_squares / count - varies[TONE] ** 2))
+
+
+@_kernel
+def slopes(tones, inner, samples, counts):  # type: ignore[no-untyped-def]
+    """Fill `counts` (SLOPES,) with how many of the pixels of `inner`, which is 0 along the border, have each
+    slope of `tones` (h, w) uint8 (Sobel's gradient). Of every n-th row, so that there are about `samples`."""
+    counts[:] = 0
+    count = 0
+    for y in range(inner.shape[0]):
+        for x in range(inner.shape[1]):
+            count += inner[y, x]
+    for y in range(1, inner.shape[0] - 1, count // samples + 1):
+        for x in range(1, inner.shape[1] - 1):
+            if inner[y, x]:
+                falling = int(tones[y - 1, x - 1]) - int(tones[y + 1, x + 1])
+                rising = int(tones[y + 1, x - 1]) - int(tones[y - 1, x + 1])
+                across = falling + rising + 2 * (int(tones[y, x - 1]) - int(tones[y, x + 1]))
+                down = falling - rising + 2 * (int(tones[y - 1, x]) - int(tones[y + 1, x]))
+                slope = int(math.sqrt(across * across + down * down))
+                counts[min(slope, SLOPES - 1)] += 1
 
 
 @_part

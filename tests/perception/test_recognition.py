@@ -95,6 +95,29 @@ def test_a_square_is_no_disc() -> None:
     assert found["squareness"] == pytest.approx(1.0, abs=0.1)
 
 
+def test_round_things_have_slopes_and_flat_ones_edges() -> None:
+    y, x = np.mgrid[0:60, 0:60] - 29.5
+    disc = x**2 + y**2 < 25**2
+    ball = np.where(disc, 200 * np.sqrt(np.maximum(0, 1 - (x**2 + y**2) / 26**2)), 0)
+    tile = np.where(x > 5, 90, 200)  # two flat sides
+    by_form = {}
+    for name, tones in (("flat", np.full((60, 60), 200)), ("round", ball), ("edged", tile)):
+        for light in (0.6, 1.0):
+            image = np.repeat((tones * light).astype(np.uint8)[:, :, None], 3, axis=2)
+            by_form[name, light] = by_name(image, disc)
+    for light in (0.6, 1.0):
+        flat, curved, edged = (by_form[name, light] for name in ("flat", "round", "edged"))
+        assert flat["slope"] == flat["slope_90"] == flat["edges"] == 0
+        assert curved["slope_50"] > 0.2
+        assert edged["slope_50"] == 0
+        assert edged["slope"] > 0.2
+        assert 0.05 < edged["edges"] < 0.2
+    for name in ("round", "edged"):  # brighter light changes nothing
+        for feature in ("slope", "slope_50", "slope_90", "edges"):
+            dim, bright = by_form[name, 0.6][feature], by_form[name, 1.0][feature]
+            assert dim == pytest.approx(bright, rel=0.1, abs=0.02)
+
+
 def test_where_the_region_is_in_the_image_does_not_matter() -> None:
     image, mask = picture("Blue", "square", np.random.default_rng(5))
     large, elsewhere = np.zeros((200, 300, 3), np.uint8), np.zeros((200, 300), bool)
@@ -197,9 +220,21 @@ def test_too_few_examples() -> None:
 
 @pytest.mark.parametrize("content", [b"", b"no archive", b"PK\x03\x04broken"])
 def test_a_broken_file_is_one_clear_line(tmp_path: Path, content: bytes) -> None:
-    (tmp_path / "r.npz").write_bytes(content)
-    with pytest.raises(PerceptionError, match=r"no recogniser .*cogarch learn objects"):
-        ObjectRecogniser.load(tmp_path / "r.npz")
+    for folder, domain in (("elsewhere", r"NAME \(sandwich, toys\)"), ("toys", "toys")):
+        (tmp_path / folder).mkdir()
+        (tmp_path / folder / "r.npz").write_bytes(content)
+        told = rf"no recogniser .*; make one with: cogarch learn objects --domain {domain}$"
+        with pytest.raises(PerceptionError, match=told):
+            ObjectRecogniser.load(tmp_path / folder / "r.npz")
+
+
+def test_a_recogniser_of_another_version_names_its_domain(tmp_path: Path) -> None:
+    with np.load(recogniser_path("sandwich")) as data:
+        arrays = {name: data[name] for name in data.files}
+    (tmp_path / "sandwich").mkdir()
+    np.savez(tmp_path / "sandwich" / "r.npz", **(arrays | {"features": arrays["features"][1:]}))
+    with pytest.raises(PerceptionError, match=r"another version; make one with: .* --domain sandwich$"):
+        ObjectRecogniser.load(tmp_path / "sandwich" / "r.npz")
 
 
 def test_a_domain_without_recogniser_names_the_command(

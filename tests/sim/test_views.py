@@ -60,11 +60,14 @@ def test_strangers_to_test_with_are_of_other_kinds() -> None:
 
 @pytest.mark.parametrize("name", domain_names())
 def test_shipped_recognisers_know_their_things_and_no_strangers(name: str) -> None:
-    """Few views, to be quick; benchmarks/perception has many."""
-    tested = examples(load_domain(name), 15, np.random.default_rng(4321), test=True)
+    """Few views, to be quick; benchmarks/recognition has many."""
+    tested = examples(load_domain(name), 30, np.random.default_rng(4321), test=True)
     scores = score(load_recogniser(name), tested)
-    assert scores["known_right"] >= 0.93
-    assert scores["unknown_right"] >= 0.80
+    assert scores["known_right"] >= 0.97  # three of about 80 may be wrong by chance
+    assert scores["unknown_right"] >= 0.90
+    told = load_recogniser(name).told["test"]  # 200 views
+    assert told["known_right"] >= 0.99
+    assert told["unknown_right"] >= 0.90
 
 
 def test_learning_again(tmp_path: Path) -> None:
