@@ -21,8 +21,11 @@ EXPLORED: Mapping[str, Callable[[TrialTable], Rows]] = {
     "explored": lambda table: np.ones(len(table), np.bool_),
     "explored-hand": lambda table: np.asarray(table.kind == "hand"),
     "explored-tool": lambda table: np.asarray(table.kind == "tool"),
+    "explored-seven": lambda table: np.asarray(table.object != HELD_OUT),
+    "explored-eighth": lambda table: np.asarray(table.object == HELD_OUT),
 }
-"""What can be asked for by name: all trials, those with bare hands, those with tools."""
+"""What can be asked for by name: all trials, those with bare hands, those with tools, those with seven of
+the objects, and those with the one that is held out."""
 
 
 def read_explored(name: str = DEFAULT) -> TrialTable:
@@ -31,9 +34,3 @@ def read_explored(name: str = DEFAULT) -> TrialTable:
         raise AffordanceError(unknown("exploration", name, EXPLORED))
     table = read_trials(trials_path())
     return replace(table.take(EXPLORED[name](table)), source=name)
-
-
-def seven_and_eighth(table: TrialTable) -> tuple[TrialTable, TrialTable]:
-    """The trials with seven of the objects, and those with the one that is held out."""
-    held_out = np.asarray(table.object == HELD_OUT)
-    return table.take(~held_out), table.take(held_out)

@@ -1,8 +1,9 @@
 """Chapter 5 of the thesis, recomputed: Tables 6 and 8 to 12, Figs. 46 and 47.
 
 Tables 11 and 12 and Fig. 47 rest on trials that were published (`--data`). The simulated trials behind
-Tables 8 and 9 and the real ones of Table 10 never were: these tables are recomputed from trials of one's own
-(`--trials`), and where published trials of other experiments are used instead the answer says so.
+Tables 8 and 9 and the real ones of Table 10 never were. Without `--data` everything is recomputed from
+the robot's own exploration, or from other trials (`--trials`), and where published trials of other
+experiments are used instead the answer says so.
 """
 
 from __future__ import annotations
@@ -12,7 +13,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from cognitive_arch.affordances import explored
+from cognitive_arch.affordances.answers import load_table
 from cognitive_arch.affordances.evaluation import (
+    Evaluation,
     Split,
     assess,
     compare,
@@ -33,11 +37,12 @@ from cognitive_arch.affordances.transfer import (
     success_rates,
     transfer_curve,
 )
-from cognitive_arch.affordances.trials import N_BINS, TrialTable, action_index, read_trials
+from cognitive_arch.affordances.trials import N_BINS, TrialTable, action_index
 from cognitive_arch.errors import ConfigError
 from cognitive_arch.evaluation.reproduction import Check, Options, Reproduced
 
-SPLITS = 20
+SPLITS, FEW_SPLITS = 20, 5
+MANY = 1500  # trials, with which more than a few splits tell nothing new
 TABLE6: Mapping[str, tuple[str, int]] = {
     "Baseline": ("full", 21_257_680),
     "PCA": ("pca", 168),
@@ -74,7 +79,7 @@ def table6(options: Options) -> Reproduced:
 
 def table8(options: Options) -> Reproduced:
     """Random splits of 80 to 20 per cent."""
-    table, notes = _own_trials(options, "Table 8")
+    table, notes = _own_trials(options, "Table 8", "explored-seven")
     rows = _networks(table, TABLE8, options.protocol, options)
     best = max(TABLE8, key=lambda name: rows[name]["accuracy"])
     learned_first = best in ("k2", "bde")
@@ -88,7 +93,16 @@ def table8(options: Options) -> Reproduced:
 def table9(options: Options) -> Reproduced:
     """An object that was not learned from."""
     table, notes = _own_trials(options, "Table 9")
-    rows = _networks(table, TABLE9, "leave-one-object-out", options)
+    if _shipped(options):
+        seven, eighth = map(explored.read_explored, ("explored-seven", "explored-eighth"))
+        split = Split(seven, eighth, explored.HELD_OUT)
+        rows = {
+            name: _scores(assess(iter([split]), name, "leave-one-object-out", options.seed))
+            for name in _beside(TABLE9)
+        }
+        notes.append(f"learned from seven objects, tested on the eighth ({explored.HELD_OUT})")
+    else:
+        rows = _networks(table, TABLE9, "leave-one-object-out", options)
     best = max(TABLE9, key=lambda name: rows[name]["accuracy"])
     checks = (
         *_accuracies(rows, TABLE9),
@@ -97,36 +111,43 @@ def table9(options: Options) -> Reproduced:
     return Reproduced(checks, {"rows": rows, "notes": notes})
 
 
-def _own_trials(options: Options, what: str) -> tuple[TrialTable, list[str]]:
-    """Trials to recompute `what` from, and what must be said about them."""
-    if options.trials is not None:
-        table = read_trials(options.trials)
-        return table, [f"{what} {NEVER}; these are {table.source}"]
-    if options.data is not None:
+def _shipped(options: Options) -> bool:
+    """Whether nothing was said of trials: then the robot's own exploration is meant."""
+    return options.trials is None and options.data is None
+
+
+def _own_trials(options: Options, what: str, name: str = explored.DEFAULT) -> tuple[TrialTable, list[str]]:
+    """Trials to recompute `what` from, by default the shipped ones called `name`, and what must be said
+    about them."""
+    if options.data is not None and options.trials is None:
         table = without_start(read_published(options.data, "icub_tools"))
         note = "these are 922 other ones, of a real robot with three tools, so numbers need not agree"
         return table, [f"{what} {NEVER}; {note}"]
-    raise ConfigError(
-        f"{what} {NEVER}; give trials of your own with --trials FILE, or the published ones of another "
-        "experiment with --data DIR"
-    )
+    table = load_table(name if options.trials is None else str(options.trials), None)
+    return table, [f"{what} {NEVER}; these are {table.source}, {len(table)} trials"]
+
+
+def _beside(names: Mapping[str, object]) -> list[str]:
+    return [*names, "default", "majority", "forest", "logistic"]
 
 
 def _networks(
     table: TrialTable, names: Mapping[str, object], protocol: str, options: Options
 ) -> dict[str, dict[str, float]]:
     """Accuracy, distance and random predictions of networks, the default model and baselines."""
-    models = [*names, "default", "majority", "forest", "logistic"]
-    count = options.episodes or SPLITS
-    rows = {}
-    for found in compare(table, models, protocol, count, options.seed):
-        rows[found.model] = {
-            "accuracy": found.mean("accuracy"),
-            "distance": found.mean("distance"),
-            "random": found.random,
-            "log_likelihood": found.mean("log_likelihood"),
-        }
-    return rows
+    count = options.episodes or (SPLITS if len(table) < MANY else FEW_SPLITS)
+    return {
+        found.model: _scores(found) for found in compare(table, _beside(names), protocol, count, options.seed)
+    }
+
+
+def _scores(found: Evaluation) -> dict[str, float]:
+    return {
+        "accuracy": found.mean("accuracy"),
+        "distance": found.mean("distance"),
+        "random": found.random,
+        "log_likelihood": found.mean("log_likelihood"),
+    }
 
 
 def _accuracies(
@@ -145,14 +166,15 @@ def _accuracies(
 
 def table10(options: Options) -> Reproduced:
     """From simulation to reality: what a tap from the left with a stick does to a ball and to a box."""
-    if options.trials is None or options.data is None:
+    if options.data is None:
         raise ConfigError(
-            f"Table 10 {NEVER} (simulated ones to learn from, 21 real ones to test on); give trials of your "
-            "own with --trials FILE and published real ones of another experiment with --data DIR"
+            f"Table 10 {NEVER} (simulated ones to learn from, 21 real ones to test on); give published real "
+            "ones of another experiment with --data DIR, and, if not the robot's own exploration, simulated "
+            "ones with --trials FILE"
         )
-    own = without_start(read_trials(options.trials))
+    simulated = _named(load_table(str(options.trials or explored.DEFAULT), None))
     real = without_start(read_published(options.data, "icub_tools"))
-    own, real = _common(own, real)
+    own, real = _common(without_start(simulated), real)
     action = action_index("tapFromLeft")
     checks, numbers = [], {}
     for title, objects in (("ball", ("bball", "yball")), ("box", ("ylego",))):
@@ -170,7 +192,30 @@ def table10(options: Options) -> Reproduced:
         checks.append(
             Check(f"{title}: match distance, averaged over x and y", "below 0.40 (10 %)", text, near)
         )
-    return Reproduced(tuple(checks), {"match_distance": numbers, "notes": [f"Table 10 {NEVER}"]})
+    both_ways = _both_ways(simulated, options)
+    notes = [f"Table 10 {NEVER}", *(f"{way}: accuracy {_shares(row)}" for way, row in both_ways.items())]
+    return Reproduced(tuple(checks), {"match_distance": numbers, "both_ways": both_ways, "notes": notes})
+
+
+def _both_ways(simulated: TrialTable, options: Options) -> dict[str, dict[str, float]]:
+    """Accuracy of what was learned in simulation on real hands and tools, and the other way round; `majority`
+    is the most frequent effect per action where it was learned."""
+    assert options.data is not None
+    found = {}
+    for kind in ("hand", "tool"):
+        ours = without_start(simulated.take(simulated.kind == kind))
+        if not len(ours):
+            continue
+        ours, real = _common(ours, without_start(read_published(options.data, kind)))
+        for way, split in (
+            (f"simulated {kind}s to real ones", Split(ours, real, kind)),
+            (f"real {kind}s to simulated ones", Split(real, ours, kind)),
+        ):
+            found[way] = {
+                name: assess(iter([split]), name, "trial", options.seed).mean("accuracy")
+                for name in ("default", "pca-two-blocks", "forest", "majority")
+            }
+    return found
 
 
 def _common(a: TrialTable, b: TrialTable) -> tuple[TrialTable, TrialTable]:
@@ -196,19 +241,23 @@ def _common(a: TrialTable, b: TrialTable) -> tuple[TrialTable, TrialTable]:
 
 def _hands_and_tools(options: Options, what: str) -> tuple[TrialTable, TrialTable]:
     """Trials of hands and of tools: of one's own (told apart by the column `kind`), or the published ones."""
-    if options.trials is not None:
-        table = read_trials(options.trials)
+    if options.trials is not None or options.data is None:
+        table = _named(load_table(str(options.trials or explored.DEFAULT), None))
         hands, tools = (table.take(table.kind == kind) for kind in ("hand", "tool"))
         if not (len(hands) and len(tools)):
             raise ConfigError(f"{what} needs trials of both kinds, hand and tool; see the column 'kind'")
         return hands, tools
-    if options.data is None:
-        raise ConfigError(
-            f"{what} needs trials: the published ones with --data DIR, or your own with --trials FILE"
-        )
     hands, tools = read_published(options.data, "hand"), read_published(options.data, "tool")
     same_descriptors(hands, tools)
     return hands, tools
+
+
+def _named(table: TrialTable) -> TrialTable:
+    """With the names that the published trials have: `hook` for Hook-left and Hook-right."""
+    names = np.array([str(name).lower() for name in table.manipulator])
+    for role in TABLE12_PULL:
+        names = np.where(np.char.startswith(names, f"{role}-"), role, names)
+    return replace(table, manipulator=names)
 
 
 def table11(options: Options) -> Reproduced:
@@ -320,12 +369,10 @@ def fig46(options: Options) -> Reproduced:
 
 
 def _trials_with(options: Options, what: str, manipulators: Sequence[str]) -> TrialTable:
-    if options.trials is not None:
-        table = read_trials(options.trials)
-    elif options.data is not None:
+    if options.data is not None and options.trials is None:
         table = without_start(read_published(options.data, "icub_tools"))
     else:
-        raise ConfigError(f"{what} needs trials: --data DIR (published) or --trials FILE (your own)")
+        table = _named(load_table(str(options.trials or explored.DEFAULT), None))
     for name in manipulators:
         if name not in table.manipulator:
             raise ConfigError(f"{what} needs trials with a {name}; {table.source} has none")

@@ -17,8 +17,13 @@ DESCRIBED = (
 
 def query(
     learned: Annotated[
-        Path, typer.Argument(metavar="MODEL", help="What cogarch learn networks kept (--out FILE.json).")
-    ],
+        Path | None,
+        typer.Argument(
+            metavar="MODEL",
+            help="What cogarch learn networks kept (--out FILE.json) [default: what the robot learned from "
+            "its own exploration].",
+        ),
+    ] = None,
     action: Annotated[
         str | None, typer.Option(help="tapFromRight, tapFromLeft, pull or push; left open without it.")
     ] = None,
@@ -51,6 +56,7 @@ def query(
     """Ask what an action will do, or which action or tool to take."""
     from cognitive_arch.affordances import answers
     from cognitive_arch.affordances.registry import Affordances
+    from cognitive_arch.resources import learned_affordances
 
     question = answers.Question(
         action=action,
@@ -62,7 +68,7 @@ def query(
         half=half,
         formulas=formulas,
     )
-    answer = answers.ask(Affordances.load(learned), question, picture)
+    answer = answers.ask(Affordances.load(learned or learned_affordances()), question, picture)
     print_answer(answer, answers.ask_text(answer), as_json)
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cognitive_arch.affordances import answers
-from cognitive_arch.affordances.explored import EXPLORED, HELD_OUT, read_explored, seven_and_eighth
+from cognitive_arch.affordances.explored import EXPLORED, HELD_OUT, read_explored
 from cognitive_arch.affordances.trials import ACTIONS
 from cognitive_arch.errors import AffordanceError
 
@@ -30,7 +30,7 @@ def test_names_choose_hands_or_tools() -> None:
 
 
 def test_the_eighth_object_can_be_kept_for_testing() -> None:
-    seven, eighth = seven_and_eighth(read_explored())
+    seven, eighth = read_explored("explored-seven"), read_explored("explored-eighth")
     assert set(eighth.object) == {HELD_OUT}
     assert HELD_OUT not in set(seven.object)
     assert len(eighth) / (len(seven) + len(eighth)) == pytest.approx(690 / 2353, abs=0.06)

@@ -160,6 +160,12 @@ def test_learn_and_ask_from_the_command_line(cogarch: Any, files: Path) -> None:
     assert np.sum(found.json["effects"]) == pytest.approx(1.0)
 
 
+def test_without_a_model_what_comes_along_is_asked(cogarch: Any) -> None:
+    found = cogarch("query", "--action", "pull", "--goal", "closer", "--tools", "Stick,Hook-left", "--json")
+    assert found.code == 0
+    assert found.json["choice"] == "Hook-left"
+
+
 def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tmp_path: Path) -> None:
     import cv2
 
@@ -190,9 +196,8 @@ def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tm
         (["learn", "networks", "TRIALS", "--model", "forest", "--out", "f.json"], "for comparison"),
         (["learn", "networks", "TRIALS", "--reliability", "r.png"], "needs --evaluate"),
         (["query", "TRIALS"], "is no learned model"),
-        (["reproduce", "table8"], "never published"),
         (["reproduce", "table10"], "never published"),
-        (["reproduce", "table11"], "needs trials"),
+        (["reproduce", "table9", "--trials", "absent.csv"], "no file of trials"),
         (["reproduce", "fig47", "--trials", "TRIALS"], "both kinds"),
     ],
 )
