@@ -118,6 +118,11 @@ class Eyes:
         self._size = size
         self._noise = noise or EyeNoise()
 
+    @property
+    def noisy(self) -> bool:
+        """Whether depth as seen has noise."""
+        return self._noise.depth > 0
+
     def look(self, positions: NDArray[np.floating], rng: np.random.Generator | None = None) -> EyeImage:
         """What is seen when the simulation's plant has these `positions`, (n_positions,).
 

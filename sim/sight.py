@@ -81,7 +81,7 @@ class CameraPerception(Perception):
         rng = np.random.default_rng([self._seed, round(1000 * self._world.time)])
         self.image = self._eyes.look(self._world.positions(), rng)
         image = self.image
-        view = SceneView(image.color, image.depth, image.own, image.camera, self._table)
+        view = SceneView(image.color, image.depth, image.own, image.camera, self._table, self._eyes.noisy)
         image = replace(image, depth=view.depth)
         self.sightings = sightings(view, self._classify, self._shapes)
         detections = [_detection(sighting) for sighting in self.sightings]

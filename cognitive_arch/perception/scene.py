@@ -83,7 +83,8 @@ class Sighting:
 
 class SceneView:
     """One look at a table of a known height (m): colour (height, width, 3), depth (height, width) in metres,
-    and the robot's own body in it, (height, width). The noise of single pixels is taken from the depth."""
+    and the robot's own body in it, (height, width). Of a `noisy` one the noise of single pixels is taken from
+    the depth, which costs slim things a pixel of their outline."""
 
     def __init__(
         self,
@@ -92,10 +93,12 @@ class SceneView:
         own: Mask,
         camera: Camera,
         table: float,
+        noisy: bool = False,
     ) -> None:
         self.color, self.own, self.camera, self.table = color, own, camera, table
-        # Edges stay where they are, corners lose a pixel.
-        self.depth = np.asarray(cv2.medianBlur(np.asarray(depth, np.float32), SMOOTH_DEPTH), np.float32)
+        self.depth = np.asarray(depth, np.float32)
+        if noisy:
+            self.depth = np.asarray(cv2.medianBlur(self.depth, SMOOTH_DEPTH), np.float32)
         self.points = camera.points(self.depth)
 
     def raised(self) -> Mask:
