@@ -114,8 +114,10 @@ def _is_reflection(contour: NDArray[np.int32], mask: Mask, image: Image, table: 
     x, y, width, height = cv2.boundingRect(contour)
     rows, columns = slice(y, y + height), slice(x, x + width)
     own = mask[rows, columns]
-    added = np.array(cv2.mean(image[rows, columns], own)[:3]) - table.colour
-    if min(added.tolist()) <= 0 or np.abs(added - added.mean()).max() > WHITISH + 0.25 * added.mean():
+    inside = cv2.mean(image[rows, columns], own)[:3]
+    added = [one - usual for one, usual in zip(inside, table.colour.tolist(), strict=True)]
+    white = sum(added) / 3
+    if min(added) <= 0 or max(abs(one - white) for one in added) > WHITISH + 0.25 * white:
         return False
     outline = contour[:: max(1, len(contour) // 48), 0].astype(np.float32)
     outwards = outline - np.array([x + (width - 1) / 2, y + (height - 1) / 2], np.float32)

@@ -113,10 +113,16 @@ class Descriptor:
 
 @dataclass(frozen=True, slots=True)
 class Formulas:
-    """A table of descriptors, and by how much of its perimeter the whole's outline is simplified first."""
+    """A table of descriptors: `forms` of its own, then the moments, which all tables have. By `simplified` of
+    its perimeter the whole's outline is simplified first."""
 
-    rows: tuple[Descriptor, ...]
+    forms: tuple[Descriptor, ...]
     simplified: float = 0.0
+
+    @property
+    def rows(self) -> tuple[Descriptor, ...]:
+        """All descriptors, in order."""
+        return (*self.forms, *_MOMENTS)
 
     @property
     def names(self) -> tuple[str, ...]:
@@ -139,7 +145,6 @@ FORMULAS: Mapping[str, Formulas] = {
             Descriptor("circularity", circularity, _ALL),
             Descriptor("squareness", squareness, _ALL),
             Descriptor("convexity_defects", convexity_defects, _TURNED),
-            *_MOMENTS,
         )
     ),
     BLOB: Formulas(
@@ -151,7 +156,6 @@ FORMULAS: Mapping[str, Formulas] = {
             Descriptor("circularity", circularity, _ALL),
             Descriptor("squareness", squareness, _ALL),
             Descriptor("convexity_defects", convexity_defects, _TURNED),
-            *_MOMENTS,
         ),
         simplified=0.02,
     ),
@@ -182,18 +186,23 @@ class Descriptions:
         return np.array([getattr(self, part)[name] for part in parts for name in wanted])
 
 
-def describe(mask: Mask, formulas: str = DEFAULT) -> Descriptions:
+def describe(mask: Mask, formulas: str = DEFAULT, contour: NDArray[np.int32] | None = None) -> Descriptions:
     """The descriptors of one blob.
 
     `mask` is (h, w) uint8 or bool, not 0 where the blob is; the crop may be wider than the blob. Of a blob in
     several pieces the largest is described; its holes count as filled. `formulas` names a table of
-    `FORMULAS`. Raises `PerceptionError` for an unknown name, for what is no mask, and for an empty one.
+    `FORMULAS`. `contour` (n, 2), x and y in `mask`, is its outline where that is known. Raises
+    `PerceptionError` for an unknown name, for what is no mask, and for an empty one.
     """
     table = FORMULAS.get(formulas)
     if table is None:
         raise PerceptionError(unknown("set of formulas", formulas, FORMULAS))
-    blob = cropped(mask)
-    whole = outline(blob)
+    if contour is None:
+        blob = cropped(mask)
+        whole = outline(blob)
+    else:
+        blob = np.ascontiguousarray(mask).view(np.uint8)
+        whole = Outline(contour[:, None])
     top, bottom = halves(blob, whole)
     if table.simplified:
         whole = whole.simplified(table.simplified)
@@ -201,4 +210,6 @@ def describe(mask: Mask, formulas: str = DEFAULT) -> Descriptions:
 
 
 def _row(table: Formulas, blob: Outline) -> dict[str, float]:
-    return {row.name: row.compute(blob) for row in table.rows}
+    row = {form.name: form.compute(blob) for form in table.forms}
+    row.update(zip(MOMENTS, blob.moments, strict=True))
+    return row

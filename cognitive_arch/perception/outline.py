@@ -45,8 +45,8 @@ class Rectangle(NamedTuple):
 class Outline:
     """What can be measured along a closed outline.
 
-    `contour` is (n, 1, 2) int32, pixels, `area` in square pixels, `perimeter` in pixels; `hull` (k, 1, 2)
-    int32 are the corners of the convex hull, `hull_perimeter` its length in pixels. `rectangle` is the
+    `contour` is (n, 1, 2) int32, pixels, `area` in square pixels, `perimeter` in pixels; `hull` (k, 2)
+    float32 are the corners of the convex hull, `hull_perimeter` its length in pixels. `rectangle` is the
     smallest one around it, the longest of several that are equally small: every triangle has three of them,
     so that without a rule a turn would exchange its main axis. `ellipse_ratio` is the minor by the major axis
     of the ellipse that fits the outline best; where none does (fewer than five points, no area, or points of
@@ -58,9 +58,9 @@ class Outline:
     def __init__(self, contour: Points, up: tuple[float, float] = (0.0, -1.0)) -> None:
         self.contour = contour
         corners = cv2.convexHull(contour, returnPoints=False).reshape(-1, 1)
-        self.hull: Points = contour[corners[:, 0]]
+        self.hull = np.empty((len(corners), 2), np.float32)
         numbers = np.empty(kernels.FIRST_MOMENT + len(kernels.MOMENTS))
-        kernels.measure(contour[:, 0], corners, *up, DEEP, numbers)
+        kernels.measure(contour[:, 0], corners, *up, DEEP, self.hull, numbers)
         measured = numbers.tolist()
         self.area: float = measured[kernels.AREA]
         self.perimeter: float = measured[kernels.PERIMETER]

@@ -22,15 +22,17 @@ _part = numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True)
 
 
 @_kernel
-def measure(points, corners, up_x, up_y, deep, numbers):  # type: ignore[no-untyped-def]
+def measure(points, corners, up_x, up_y, deep, hull, numbers):  # type: ignore[no-untyped-def]
     """Fill `numbers` (10 + 7,) float64 with what is measured along an outline, whose convex hull has the
-    points with the indices `corners` (k, 1) int32, in its order.
+    points with the indices `corners` (k, 1) int32, in its order, and `hull` (k, 2) float32 with those points.
 
     Moments are those of the outline turned so that the unit vector (`up_x`, `up_y`) points up. Bays are
     counted that reach deeper than `deep` pixels below the hull.
     """
+    for k in range(len(corners)):
+        hull[k, 0], hull[k, 1] = points[corners[k, 0], 0], points[corners[k, 0], 1]
     _moments(points, up_x, up_y, numbers)
-    _rectangle(points, corners, numbers)
+    _rectangle(hull, numbers)
     numbers[BAYS] = _bays(points, corners, deep)
     numbers[ELLIPSE] = 0.0
     if len(points) >= 5 and numbers[AREA] > 0:
@@ -91,28 +93,26 @@ def _moments(points, up_x, up_y, numbers):  # type: ignore[no-untyped-def]
 
 
 @_part
-def _rectangle(points, corners, numbers):  # type: ignore[no-untyped-def]
+def _rectangle(hull, numbers):  # type: ignore[no-untyped-def]
     """Length of the hull, and the smallest rectangle around it, of which one side lies along an edge.
 
     Of several that are equally small the longest counts, and of the axes of a square the more upright.
     """
     numbers[LONG] = numbers[SHORT] = numbers[UP_X] = numbers[HULL] = 0.0
-    numbers[UP_Y], numbers[MIDDLE] = -1.0, -points[corners[0, 0], 1]
+    numbers[UP_Y], numbers[MIDDLE] = -1.0, -hull[0, 1]
     smallest = np.inf
-    for n in range(len(corners)):
-        here, before = corners[n, 0], corners[n - 1, 0]
-        x, y = float(points[here, 0] - points[before, 0]), float(points[here, 1] - points[before, 1])
+    for n in range(len(hull)):
+        x, y = np.float64(hull[n, 0] - hull[n - 1, 0]), np.float64(hull[n, 1] - hull[n - 1, 1])
         edge = math.sqrt(x * x + y * y)
         if edge == 0:
             continue  # a single point
         numbers[HULL] += edge
         x, y = x / edge, y / edge
         low, high, left, right = np.inf, -np.inf, np.inf, -np.inf
-        for k in range(len(corners)):
-            at_x, at_y = points[corners[k, 0], 0], points[corners[k, 0], 1]
-            along, across = x * at_x + y * at_y, x * at_y - y * at_x
-            low, high = min(low, along), max(high, along)
-            left, right = min(left, across), max(right, across)
+        for k in range(len(hull)):
+            along, across = x * hull[k, 0] + y * hull[k, 1], x * hull[k, 1] - y * hull[k, 0]
+            low, high = along if along < low else low, along if along > high else high
+            left, right = across if across < left else left, across if across > right else right
         long, short, middle = high - low, right - left, (low + high) / 2
         if short > long * (1 + SAME) or (short > long * (1 - SAME) and abs(x) > abs(y)):
             long, short, middle, x, y = short, long, (left + right) / 2, -y, x
@@ -163,18 +163,24 @@ def _ellipse(points):  # type: ignore[no-untyped-def]
     x0, y0 = x0 / len(points), y0 / len(points)
     for n in range(len(points)):
         size = max(size, abs(points[n, 0] - x0), abs(points[n, 1] - y0))
-    term, found, square = np.empty(6), np.empty(5), np.empty((5, 6))
+    found, square = np.empty(5), np.empty((5, 6))
     for terms in (5, 3):
-        square[:] = 0.0
-        term[terms] = 1.0
+        # Sums over the points of x^4, x^3 y, ..., y^4, x^3, ..., y; each stands in several places.
+        s40 = s31 = s22 = s13 = s04 = s30 = s21 = s12 = s03 = s20 = s11 = s02 = s10 = s01 = 0.0
         for n in range(len(points)):
             x, y = (points[n, 0] - x0) / size, (points[n, 1] - y0) / size
-            term[0], term[1], term[2] = x * x, y * y, x * y
-            if terms == 5:
-                term[3], term[4] = x, y
-            for i in range(terms):
-                for k in range(i, terms + 1):
-                    square[i, k] += term[i] * term[k]
+            xx, xy, yy = x * x, x * y, y * y
+            s40, s31, s22 = s40 + xx * xx, s31 + xx * xy, s22 + xx * yy
+            s13, s04 = s13 + yy * xy, s04 + yy * yy
+            s30, s21, s12, s03 = s30 + xx * x, s21 + xx * y, s12 + yy * x, s03 + yy * y
+            s20, s11, s02, s10, s01 = s20 + xx, s11 + xy, s02 + yy, s10 + x, s01 + y
+        square[0, 0], square[0, 1], square[0, 2] = s40, s22, s31
+        square[1, 1], square[1, 2], square[2, 2] = s04, s13, s22
+        if terms == 5:
+            square[0, 3], square[0, 4], square[1, 3], square[1, 4] = s30, s21, s12, s03
+            square[2, 3], square[2, 4], square[3, 3] = s21, s12, s20
+            square[3, 4], square[4, 4], square[3, 5], square[4, 5] = s11, s02, s10, s01
+        square[0, terms], square[1, terms], square[2, terms] = s20, s02, s11
         for i in range(terms):  # elimination; the matrix is symmetric and, if there is a solution, positive
             if square[i, i] < SINGULAR * len(points):
                 return 0.0

@@ -208,6 +208,9 @@ def widened(mask: Mask, margin: int) -> Mask:
     # An added pixel gives way where it would touch another piece, or what was added to one of a lower number.
     touches = (least_around < number) | (own_around > number) | (least_own_around < number)
     wider[(mask == 0) & touches] = 0
+    # What is cut off from its piece by that is nobody's.
+    _, joined = cv2.connectedComponents(wider, connectivity=8)
+    wider[~np.isin(joined, joined[mask > 0])] = 0
     return wider
 
 

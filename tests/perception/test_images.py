@@ -65,7 +65,7 @@ def filmed(path: Path, count: int = 3, code: str = "MJPG") -> Path:
     return path
 
 
-def refused(call: Callable[[], object], *parts: object) -> None:
+def assert_told(call: Callable[[], object], *parts: object) -> None:
     """`call` raises an error of one line, with a cause that stays hidden, that says all of `parts`."""
     with pytest.raises(PerceptionError) as caught:
         call()
@@ -111,26 +111,30 @@ def test_a_photograph_is_turned_upright(tmp_path: Path) -> None:
 
 
 def test_what_is_no_file_is_told_apart(tmp_path: Path) -> None:
-    refused(lambda: read_image(tmp_path / "none.png"), "cannot read the image", "none.png", "No such file")
-    refused(lambda: read_image(tmp_path), "no regular file", tmp_path.name, "webp")
-    refused(lambda: read_image(Path("nul\0l.png")), "'nul l.png'")
-    refused(lambda: read_image(tmp_path / "new\nline.png"), "new line.png")
-    refused(lambda: list(frames(Path("x" * 300))), "cannot read the image", "too long")
-    refused(lambda: list(frames(Path("x" * 300 + ".mp4"))), "cannot read the video", "too long")
+    assert_told(
+        lambda: read_image(tmp_path / "none.png"), "cannot read the image", "none.png", "No such file"
+    )
+    assert_told(lambda: read_image(tmp_path), "no regular file", tmp_path.name, "webp")
+    assert_told(lambda: read_image(Path("nul\0l.png")), "'nul l.png'")
+    assert_told(lambda: read_image(tmp_path / "new\nline.png"), "new line.png")
+    assert_told(lambda: list(frames(Path("x" * 300))), "cannot read the image", "too long")
+    assert_told(lambda: list(frames(Path("x" * 300 + ".mp4"))), "cannot read the video", "too long")
     assert not is_many(Path("x" * 300))
 
 
 def test_a_long_path_keeps_the_name_of_its_file(tmp_path: Path) -> None:
-    refused(lambda: read_image(tmp_path.joinpath(*["folder" * 10] * 5, "table.png")), "'...", "/table.png'")
+    assert_told(
+        lambda: read_image(tmp_path.joinpath(*["folder" * 10] * 5, "table.png")), "'...", "/table.png'"
+    )
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes on this system")
 def test_pipes_and_devices_are_not_waited_for(tmp_path: Path) -> None:
     os.mkfifo(tmp_path / "a.png")
     os.mkfifo(tmp_path / "a.mp4")
-    refused(lambda: list(frames(tmp_path / "a.png")), "a.png' is no regular file; valid: bmp")
-    refused(lambda: list(frames(tmp_path / "a.mp4")), "a.mp4' is no regular file; valid: avi")
-    refused(lambda: read_mask(Path("/dev/zero")), "no regular file")
+    assert_told(lambda: list(frames(tmp_path / "a.png")), "a.png' is no regular file; valid: bmp")
+    assert_told(lambda: list(frames(tmp_path / "a.mp4")), "a.mp4' is no regular file; valid: avi")
+    assert_told(lambda: read_mask(Path("/dev/zero")), "no regular file")
     ((name, found),) = frames(tmp_path)
     assert name == "a.png"
     assert isinstance(found, PerceptionError)
@@ -146,7 +150,7 @@ def test_pipes_and_devices_are_not_waited_for(tmp_path: Path) -> None:
 )
 def test_what_is_no_image(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "a.png").write_bytes(content)
-    refused(lambda: read_image(tmp_path / "a.png"), "a.png' is no image; valid: bmp, gif")
+    assert_told(lambda: read_image(tmp_path / "a.png"), "a.png' is no image; valid: bmp, gif")
 
 
 @pytest.mark.parametrize("suffix", IMAGE_SUFFIXES)
@@ -159,7 +163,7 @@ def test_an_image_cut_off(
     path.write_bytes(whole[: int(len(whole) * share)])
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        refused(lambda: read_image(path), path.name)
+        assert_told(lambda: read_image(path), path.name)
     assert capfd.readouterr() == ("", "")
 
 
@@ -189,7 +193,7 @@ def test_damage_within_is_told_or_does_not_matter(tmp_path: Path, compression: s
 @pytest.mark.parametrize("size", [(10_000, 5_001), (12_000, 10_000), (2**31 - 1, 2**31 - 1)])
 def test_too_many_pixels_are_refused_by_the_header(tmp_path: Path, size: tuple[int, int]) -> None:
     path = png(tmp_path / "a.png", *size)
-    refused(lambda: read_image(path), f"a.png' is {size[0]}x{size[1]} pixels; valid: at most 50 million")
+    assert_told(lambda: read_image(path), f"a.png' is {size[0]}x{size[1]} pixels; valid: at most 50 million")
 
 
 def test_the_limit_itself_is_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -197,7 +201,7 @@ def test_the_limit_itself_is_valid(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr(images, "MAX_PIXELS", 40 * 30)
     assert read_image(path).shape == (30, 40, 3)
     monkeypatch.setattr(images, "MAX_PIXELS", 40 * 30 - 1)
-    refused(lambda: read_image(path), "40x30")
+    assert_told(lambda: read_image(path), "40x30")
 
 
 def test_a_mask_is_what_is_not_black(tmp_path: Path) -> None:
@@ -219,7 +223,9 @@ def test_a_folder_gives_its_images_by_name(tmp_path: Path) -> None:
     found = dict(frames(tmp_path))
     assert list(found) == ["a.png", "b.png", "c.JPG", "d.gif"]
     assert [name for name, one in found.items() if isinstance(one, PerceptionError)] == ["b.png"]
-    refused(lambda: list(frames(tmp_path / "f.png")), "no image in the folder", "f.png", "valid: bmp, gif")
+    assert_told(
+        lambda: list(frames(tmp_path / "f.png")), "no image in the folder", "f.png", "valid: bmp, gif"
+    )
 
 
 @pytest.mark.parametrize(("name", "code"), [("clip.avi", "MJPG"), ("clip.MP4", "mp4v"), ("clip.mkv", "mp4v")])
@@ -245,17 +251,17 @@ def test_the_name_of_a_video_is_no_pattern(tmp_path: Path, monkeypatch: pytest.M
 def test_a_name_that_is_not_utf_8_is_no_crash(tmp_path: Path) -> None:
     path = tmp_path / os.fsdecode(b"a\xff.mp4")
     path.write_text("no video")
-    refused(lambda: list(frames(path)), "is not UTF-8")
+    assert_told(lambda: list(frames(path)), "is not UTF-8")
     assert np.array_equal(read_image(saved(tmp_path / os.fsdecode(b"a\xff.png"))), noise())
 
 
 @pytest.mark.parametrize("suffix", VIDEO_SUFFIXES)
 def test_what_is_no_video(tmp_path: Path, suffix: str, capfd: pytest.CaptureFixture[str]) -> None:
     path = tmp_path / f"a{suffix}"
-    refused(lambda: list(frames(path)), "cannot read the video", path.name, "No such file")
+    assert_told(lambda: list(frames(path)), "cannot read the video", path.name, "No such file")
     for content in (b"", b"no video\n" * 500):
         path.write_bytes(content)
-        refused(lambda: list(frames(path)), path.name, " video")  # FFmpeg takes text for some kinds
+        assert_told(lambda: list(frames(path)), path.name, " video")  # FFmpeg takes text for some kinds
     assert capfd.readouterr() == ("", "")
 
 
@@ -317,7 +323,7 @@ def test_a_video_without_frames_or_with_too_large_ones(clip: Path, monkeypatch: 
         (FakeCapture(1, cv2.error("bad\nframe")), "bad frame"),
     ]:
         monkeypatch.setattr(cv2, "VideoCapture", capture)
-        refused(lambda: list(frames(clip)), "a.mp4", part)
+        assert_told(lambda: list(frames(clip)), "a.mp4", part)
         assert capture.released == 1
 
 

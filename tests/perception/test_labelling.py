@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
 from cognitive_arch.errors import PerceptionError
+from cognitive_arch.perception.descriptors import describe
 from cognitive_arch.perception.labelling import label_blobs
 
 masks = arrays(np.bool_, st.tuples(st.integers(1, 14), st.integers(1, 14)))
@@ -28,6 +29,13 @@ def test_blobs_are_the_connected_pieces_of_the_mask(mask: np.ndarray, min_area: 
         assert (*blob.bbox, blob.area) == tuple(stats[piece].tolist())
         assert blob.centroid == pytest.approx(tuple(centroids[piece]))
         assert blob.mask.shape == (blob.bbox[3], blob.bbox[2])
+
+
+@settings(deadline=None)
+@given(masks)
+def test_outlines_of_blobs_are_those_they_are_described_by(mask: np.ndarray) -> None:
+    for blob in label_blobs(mask, 1).blobs:
+        assert describe(blob.mask, contour=blob.contour - blob.bbox[:2]) == describe(blob.mask)
 
 
 def test_an_island_in_a_ring_is_a_blob_of_its_own() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
@@ -178,7 +178,13 @@ def test_pieces_grow_and_stay_apart() -> None:
     assert widened(mask, 0) is mask
 
 
+BETWEEN_THREE = np.zeros((12, 14), np.bool_)
+BETWEEN_THREE[[3, 6, 8], [0, 2, 2]] = True
+"""Of what is added here a pixel was left that touched nothing."""
+
+
 @given(arrays(np.bool_, (12, 14)), st.integers(1, 4))
+@example(BETWEEN_THREE, 2)
 def test_no_margin_merges_or_loses_pieces(mask: np.ndarray, margin: int) -> None:
     pixels = mask.astype(np.uint8) * 255
     wider = widened(pixels, margin)

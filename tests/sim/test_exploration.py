@@ -159,16 +159,16 @@ def test_files_of_something_else_are_left_alone(cogarch: Any, tmp_path: Path) ->
         (["--seed", "2", "--kind", "tool"], "holds another exploration (seed 1, now 2)"),
         (["--seed", "1"], "holds another exploration (kind tool, now both)"),
     ):
-        refused(cogarch("explore", "--out", str(out), "--trials", "3", *options), said)
+        assert_refused(cogarch("explore", "--out", str(out), "--trials", "3", *options), said)
     assert out.read_text() == before
     out.write_text(before.replace(",tool,", ",hand,"))
-    refused(
+    assert_refused(
         cogarch("explore", "--out", str(out), "--trials", "3", "--seed", "1", "--kind", "tool"),
         "has been changed by something else",
     )
     mine = tmp_path / "mine.csv"
     mine.write_text("precious\n")
-    refused(cogarch("explore", "--out", str(mine)), "not a file of this exploration")
+    assert_refused(cogarch("explore", "--out", str(mine)), "not a file of this exploration")
     assert mine.read_text() == "precious\n"
 
 
@@ -184,7 +184,7 @@ def test_files_of_something_else_are_left_alone(cogarch: Any, tmp_path: Path) ->
     ],
 )
 def test_bad_input_is_told_in_one_line(cogarch: Any, options: list[str], said: str) -> None:
-    refused(cogarch("explore", *options), said)
+    assert_refused(cogarch("explore", *options), said)
 
 
 def test_the_answer_counts_and_pictures_are_kept(cogarch: Any, tmp_path: Path) -> None:
@@ -201,7 +201,7 @@ def test_the_answer_counts_and_pictures_are_kept(cogarch: Any, tmp_path: Path) -
     assert len(out.read_text().splitlines()[1].split(",")) == len(COLUMNS)
 
 
-def refused(answer: Any, said: str) -> None:
+def assert_refused(answer: Any, said: str) -> None:
     assert answer.code == 2
     (line,) = [row for row in answer.err.splitlines() if row.strip()]
     assert said in line
