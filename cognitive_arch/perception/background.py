@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -17,7 +18,7 @@ with kernels_kept(Path(__file__).parent):
 Image = NDArray[np.uint8]  # (height, width, 3), RGB
 Mask = NDArray[np.uint8]  # (height, width), 255 on things
 
-SAMPLES = 2500  # pixels that tell the table's colour
+SAMPLES = 2500  # pixels, at most, that tell the table's colour
 BINS = 32  # of the shares of red and green in a colour
 DARK = 6.0  # grey levels added before colours are divided: the darkest ones are mostly rounding
 SPAN = 0.4  # of a side of the picture, from which on a piece at the border is not on the table
@@ -58,7 +59,7 @@ def estimate_background(image: Image, ignore: NDArray[np.bool_] | None = None) -
     """The commonest colour of `image` (height, width, 3), whatever its brightness, where `ignore` (height,
     width) is not true; None where all is ignored."""
     height, width = image.shape[:2]
-    step = max(1, int(np.sqrt(height * width / SAMPLES)))
+    step = math.ceil(math.sqrt(height * width / SAMPLES))
     pixels = image[::step, ::step].reshape(-1, 3)
     if ignore is not None:
         pixels = pixels[~ignore[::step, ::step].ravel().astype(np.bool_)]
