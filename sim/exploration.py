@@ -26,7 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cognitive_arch.affordances.trials import ACTIONS
+from cognitive_arch.affordances.trials import ACTIONS, KINDS
 from cognitive_arch.domain import Domain, Placement, Scene
 from cognitive_arch.footprint import Point, footprint
 from cognitive_arch.shapes import Box, Compound, Shape, ToolShape
@@ -47,18 +47,18 @@ DIRECTIONS: Mapping[str, float] = {  # rad, of the world; the robot looks along 
     "push": math.pi,
 }
 TOOL_END: Mapping[str, float] = {
-    "tapFromLeft": 0.020,
-    "tapFromRight": 0.020,
-    "pull": 0.035,
-    "push": 0.030,
+    "tapFromLeft": -0.020,
+    "tapFromRight": -0.020,
+    "pull": 0.015,
+    "push": 0.015,
 }
 """How far beyond the place of the object's middle the middle of a tool's head is taken, metres."""
-HAND_END: Mapping[str, float] = {"tapFromLeft": 0.03, "tapFromRight": 0.03, "pull": 0.015, "push": 0.04}
+HAND_END: Mapping[str, float] = {"tapFromLeft": 0.01, "tapFromRight": 0.01, "pull": 0.015, "push": 0.015}
 """The same for the tips of the fingers."""
-END_SPREAD = 0.010  # m
+END_SPREAD = 0.005  # m
 GAP = 0.008  # m between effector and object at first, at least
 GAP_SPREAD = 0.008  # m
-AIM_SPREAD = 0.015  # m across the course
+AIM_SPREAD = 0.008  # m across the course
 COURSE_SPREAD, SKEW_SPREAD = 0.10, 0.07  # rad
 OVERLAP = 0.012  # m that a tapping tool reaches beyond the object's middle
 FRICTION_SPREAD = 0.25  # of friction, up or down
@@ -70,7 +70,8 @@ TOOL_Y, HAND_Y = (-0.06, 0.26), (0.02, 0.28)  # m towards the side of the hand
 SETTLE, REST = 0.1, 0.5  # s before and after the movement
 PIECE = 0.03  # m between two waypoints
 DRAWS = 200
-HELD_OUT_CARDS = 3  # for one of every other object: 30 % of the trials, as in thesis Sec. 5.4.1.1
+CARDS, TRIALS = 0, 1  # what random numbers are for
+HELD_OUT_CARDS = 9  # for one of every other object: 30 % of the trials, as in thesis Sec. 5.4.1.1
 
 
 @dataclass(frozen=True)
@@ -101,12 +102,14 @@ class Attempt:
 
 @dataclass(frozen=True)
 class Outcome:
-    """Where the object stood and where it came to rest, or left the table, metres; which views of the things
-    were described, and how often a place was drawn that the arm does not reach."""
+    """Where the object stood and where it came to rest, or left the table, metres; how it was turned at
+    first, radians; which views of the things were described, and how often a place was drawn that the arm
+    does not reach."""
 
     setup: Setup
     start: Point
     end: Point
+    yaw: float
     fell: bool
     view: int
     draws: int
@@ -116,7 +119,7 @@ class Outcome:
         """`m_*`, `h_*` and `o_*`."""
         return {
             **_manipulator(self.setup.manipulator, self.setup.hand, self.view),
-            **_object(self.setup.object, self.view),
+            **descriptors_of(OBJECTS[self.setup.object], self.view, self.yaw),
         }
 
 
@@ -127,18 +130,13 @@ def _manipulator(name: str, hand: str, view: int) -> Descriptors:
     return hand_descriptors(Posture(name), hand, view)
 
 
-@cache
-def _object(name: str, view: int) -> Descriptors:
-    return descriptors_of(OBJECTS[name], view)
-
-
 def explore(kind: str, seed: int, block: int, place: int, picture: Path | None = None) -> Outcome:
     """A trial of `kind` (`hand` or `tool`): that at `place` within a block of trials with the same things.
 
     What it is follows from `seed` and these numbers alone. `picture` is where to keep a picture (PNG) of
     before and after.
     """
-    rng = np.random.default_rng([seed, len(kind), block, place])
+    rng = _stream(kind, seed, TRIALS, block, place)
     return try_out(draw_setup(kind, seed, block, place), rng, picture)
 
 
@@ -152,8 +150,13 @@ def try_out(setup: Setup, rng: np.random.Generator, picture: Path | None = None)
             start, end, fell = bench.carry_out(attempt)
             if picture is not None:
                 bench.save_picture([before, bench.world.positions()], picture)
-            return Outcome(setup, start, end, fell, int(rng.integers(VIEWS)), draws)
+            return Outcome(setup, start, end, attempt.placement.yaw, fell, int(rng.integers(VIEWS)), draws)
     raise AssertionError(f"no place found for {setup}")
+
+
+def _stream(kind: str, seed: int, use: int, *numbers: int) -> np.random.Generator:
+    """Random numbers for one use (`CARDS` or `TRIALS`) and nothing else, of trials of `kind`."""
+    return np.random.default_rng([seed, KINDS.index(kind), use, *numbers])
 
 
 def draw_setup(kind: str, seed: int, block: int, place: int) -> Setup:
@@ -162,7 +165,7 @@ def draw_setup(kind: str, seed: int, block: int, place: int) -> Setup:
     objects = [*OBJECTS, *[HELD_OUT] * (HELD_OUT_CARDS - 1)]
     cards = list(itertools.product(HANDS, known, objects))
     pack, card = divmod(block, len(cards))
-    dealt = np.random.default_rng([seed, len(kind), pack]).permutation(len(cards))[card]
+    dealt = _stream(kind, seed, CARDS, pack).permutation(len(cards))[card]
     hand, manipulator, obj = cards[int(dealt)]
     return Setup(hand, manipulator, ACTIONS[place % len(ACTIONS)], obj)
 

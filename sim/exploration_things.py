@@ -1,17 +1,18 @@
-"""What the robot explores with and on: a family of tools, the postures of its hands, and eight objects.
+"""What the robot explores with and on: a family of tools, postures of its hands, objects of eight forms.
 
 The tools are sticks, rakes (a bar across), and hooks (the bar on one side), in several sizes, so that what is
-learnt can be of their shapes. The objects follow thesis Fig. 45: many shapes and sizes; the eighth is for
-testing what was learnt from the other seven.
+learnt can be of their shapes. The objects follow thesis Fig. 45: seven forms in three sizes, so that it can
+be learnt what sizes do; the eighth, in one size, is for testing what was learnt from the others.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 
 from cognitive_arch.affordances.explored import HELD_OUT
 from cognitive_arch.domain import Domain, ObjectSpec
-from cognitive_arch.shapes import Box, Compound, Cylinder, Part, Shape, Sphere, ToolShape
+from cognitive_arch.shapes import Box, Compound, Cylinder, Part, Shape, Solid, Sphere, ToolShape
 
 TOOL_COLOR, OBJECT_COLOR = (0.50, 0.30, 0.10), (0.20, 0.45, 0.75)
 DENSITY = 350.0  # kg/m^3, hollow toys and light wood
@@ -66,7 +67,7 @@ _BRICK = Compound(
         Part(solid=_cylinder(0.009, 0.006), place=(0.016, 0.0), above=0.024),
     ),
 )
-OBJECTS: Mapping[str, Shape] = {
+_FORMS: Mapping[str, Solid | Compound] = {
     "Ball": Sphere(type="sphere", radius=0.020),
     "Cube": _box(0.045, 0.045, 0.040),
     "Plate": _cylinder(0.046, 0.014),
@@ -74,18 +75,52 @@ OBJECTS: Mapping[str, Shape] = {
     "Brick": _BRICK,
     "Pear": _PEAR,
     "Plank": _box(0.110, 0.030, 0.020),
+}
+_SIZES: Mapping[str, float] = {"Small-": 0.75, "": 1.0, "Large-": 1.3}
+
+
+def _scaled(form: Solid | Compound, factor: float) -> Solid | Compound:
+    """The same form in another size."""
+    if isinstance(form, Compound):
+        parts = (
+            Part(
+                solid=_scaled_solid(part.solid, factor),
+                place=(factor * part.place[0], factor * part.place[1]),
+                above=factor * part.above,
+            )
+            for part in form.parts
+        )
+        return Compound(type="compound", parts=tuple(parts))
+    return _scaled_solid(form, factor)
+
+
+def _scaled_solid(solid: Solid, factor: float) -> Solid:
+    if isinstance(solid, Sphere):
+        return Sphere(type="sphere", radius=factor * solid.radius)
+    if isinstance(solid, Cylinder):
+        return _cylinder(factor * solid.radius, factor * solid.height)
+    x, y, z = solid.size
+    return _box(factor * x, factor * y, factor * z)
+
+
+OBJECTS: Mapping[str, Shape] = {
+    **{
+        (size + form.lower() if size else form): _scaled(shape, factor)
+        for form, shape in _FORMS.items()
+        for size, factor in _SIZES.items()
+    },
     HELD_OUT: _box(0.080, 0.055, 0.034),
 }
-_VOLUMES = {  # cubic metres, of what is no plain solid
-    "Brick": 0.064 * 0.032 * 0.024,
-    "Pear": 1.4e-4,
-}
 
 
-def _mass(name: str, shape: Shape) -> float:
+def _volume(shape: Shape) -> float:
+    """Cubic metres of a thing's parts, those that lie in each other counted twice."""
+    if isinstance(shape, Compound):
+        return sum(_volume(part.solid) for part in shape.parts)
     x, y = shape.extent
-    volume = _VOLUMES.get(name, x * y * shape.height * (0.78 if shape.is_round else 1.0))
-    return round(DENSITY * volume, 4)
+    if isinstance(shape, Sphere):
+        return math.pi / 6 * x**3
+    return x * y * shape.height * (math.pi / 4 if shape.is_round else 1.0)
 
 
 def exploration_domain() -> Domain:
@@ -95,7 +130,7 @@ def exploration_domain() -> Domain:
         for name, shape in TOOLS.items()
     }
     things |= {
-        name: ObjectSpec(shape=shape, mass=_mass(name, shape), color=OBJECT_COLOR)
+        name: ObjectSpec(shape=shape, mass=round(DENSITY * _volume(shape), 4), color=OBJECT_COLOR)
         for name, shape in OBJECTS.items()
     }
     return Domain(name="exploration", title="Finding out what tools and hands do", objects=things)

@@ -18,6 +18,7 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
@@ -56,12 +57,13 @@ DOWN = RotationMatrix(np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.
 Descriptors = dict[str, float]
 
 
-def descriptors_of(shape: Shape, view: int = 0) -> Descriptors:
+def descriptors_of(shape: Shape, view: int = 0, yaw: float = 0.0) -> Descriptors:
     """`m_*` (effector half) and `h_*` (handle) of a tool, `o_*` (whole) of any other thing, by column name.
 
     `view` 0 is the thing straight on in the middle of the picture, 1 to `VIEWS` - 1 are a little different.
+    The thing lies turned by `yaw` radians.
     """
-    return _of_mask(blob_of(shape, view), isinstance(shape, ToolShape))
+    return _of_mask(blob_of(shape, view, yaw), isinstance(shape, ToolShape))
 
 
 def hand_descriptors(posture: Posture, hand: str = "LeftHand", view: int = 0) -> Descriptors:
@@ -77,9 +79,11 @@ def _of_mask(mask: Mask, manipulator: bool) -> Descriptors:
     return top | {f"h_{name}": float(value) for name, value in found.bottom.items()}
 
 
-def blob_of(shape: Shape, view: int = 0) -> Mask:
-    """The thing as seen from above, (h, w)."""
-    return _look(shape, view)[1]
+def blob_of(shape: Shape, view: int = 0, yaw: float = 0.0) -> Mask:
+    """The thing as seen from above, (h, w), turned by `yaw` radians."""
+    raised, points = _seen(shape, view)
+    # Drawn anew from above, it may be turned after the picture was taken.
+    return top_view(raised, points @ RotationMatrix.MakeZRotation(yaw).matrix().T)
 
 
 def picture_of(shape: Shape, view: int = 0) -> Pixels:
@@ -87,9 +91,18 @@ def picture_of(shape: Shape, view: int = 0) -> Pixels:
     return _look(shape, view)[0]
 
 
-def _look(shape: Shape, view: int) -> tuple[Pixels, Mask]:
+@lru_cache(maxsize=1024)
+def _seen(shape: Shape, view: int) -> tuple[NDArray[np.bool_], NDArray[np.float64]]:
+    """Which pixels show the thing, cut to its box, and their places (n, 3), metres."""
+    _, raised, points = _look(shape, view)
+    rows, columns = np.flatnonzero(raised.any(axis=1)), np.flatnonzero(raised.any(axis=0))
+    return raised[rows[0] : rows[-1] + 1, columns[0] : columns[-1] + 1].copy(), points
+
+
+def _look(shape: Shape, view: int) -> tuple[Pixels, NDArray[np.bool_], NDArray[np.float64]]:
+    """The picture, where the thing is in it, and the places (n, 3) of these pixels, metres."""
+    turn = TURNED if isinstance(shape, ToolShape) else 0.0
     rng = np.random.default_rng([7, view])
-    turn = TURNED if isinstance(shape, ToolShape) else math.pi
     yaw, aside = (rng.uniform(-turn, turn), rng.uniform(-ASIDE, ASIDE, 2)) if view else (0.0, np.zeros(2))
     builder = DiagramBuilder()
     plant, graph = AddMultibodyPlantSceneGraph(builder, 0.0)
@@ -109,7 +122,7 @@ def _look(shape: Shape, view: int) -> tuple[Pixels, Mask]:
     color, depth = renderer.color(context, camera), renderer.depth(context, camera)
     seen = SceneView(color, depth, np.zeros(depth.shape, np.bool_), camera, 0.0)
     raised = seen.raised()
-    return color, top_view(raised, seen.points[raised].astype(np.float64))
+    return color, raised, seen.points[raised].astype(np.float64)
 
 
 def _camera(X_WC: RigidTransform) -> Camera:

@@ -14,7 +14,7 @@ from cognitive_arch.resources import trials_path
 
 DEFAULT = "explored"
 HELD_OUT = "Loaf"
-"""The eighth object (thesis Fig. 45), on which what was learnt from the other seven is tested (Table 9)."""
+"""The eighth object (thesis Fig. 45), on which what was learnt from seven other forms is tested (Table 9)."""
 
 Rows = NDArray[np.bool_]
 EXPLORED: Mapping[str, Callable[[TrialTable], Rows]] = {
@@ -24,8 +24,8 @@ EXPLORED: Mapping[str, Callable[[TrialTable], Rows]] = {
     "explored-seven": lambda table: np.asarray(table.object != HELD_OUT),
     "explored-eighth": lambda table: np.asarray(table.object == HELD_OUT),
 }
-"""What can be asked for by name: all trials, those with bare hands, those with tools, those with seven of
-the objects, and those with the one that is held out."""
+"""What can be asked for by name: all trials, those with bare hands, those with tools, those with
+objects of seven forms, and those with the one that is held out."""
 
 
 def read_explored(name: str = DEFAULT) -> TrialTable:

@@ -119,6 +119,11 @@ class Similarity:
             from sklearn.cluster import KMeans
 
             centres = KMeans(most, n_init=1, random_state=0).fit(values).cluster_centers_
+        return cls.at(centres, length)
+
+    @classmethod
+    def at(cls, centres: Floats, length: float) -> Similarity:
+        """With these centres (c, d)."""
         roots, axes = np.linalg.eigh(_kernel(centres, centres, length))
         return cls(centres, axes / np.sqrt(np.maximum(roots, 1e-6)), length)
 
@@ -143,8 +148,8 @@ class Similarity:
 
 
 def _kernel(a: Floats, b: Floats, length: float) -> Floats:
-    square = ((a[:, None] - b[None]) ** 2).sum(axis=2)
-    kernel: Floats = np.exp(-0.5 * square / length**2)
+    square = (a**2).sum(axis=1)[:, None] + (b**2).sum(axis=1) - 2 * a @ b.T
+    kernel: Floats = np.exp(-0.5 * np.maximum(square, 0.0) / length**2)
     return kernel
 
 

@@ -2,10 +2,10 @@
 
     p(effect | a, m, o, s) = sum over k of w_k p_k(effect | a, m, o, s)
 
-The parts are the action's own distribution (a Dirichlet estimate), the hierarchical softmax and the ensemble
-of tree CPDs. The weights are found by expectation-maximisation on predictions for trials that the parts have
-not seen: folds of the training trials, by object where there are enough of them, for it is new things that
-the robot asks about. Each action has weights of its own, drawn towards those of all: whether a pull works
+The parts are the action's own distribution (a Dirichlet estimate), the hierarchical softmax, the ensemble of
+tree CPDs, and the Gaussian process of how far things go. The weights are found by expectation-maximisation
+on predictions for trials that the parts have not seen: folds of the training trials, by object where there
+are enough of them, for it is new things that the robot asks about. Each action has weights of its own, drawn towards those of all: whether a pull works
 hangs on the tool, whether a push does hardly. So is found one exponent per action, which makes the
 distributions as sure as they are right, and the dependence between the two effects.
 """
@@ -21,6 +21,7 @@ from scipy.optimize import minimize_scalar
 
 from cognitive_arch.affordances.forest import TREES, ForestCPD
 from cognitive_arch.affordances.model import coupled, coupling
+from cognitive_arch.affordances.process import ProcessCPD
 from cognitive_arch.affordances.softmax import SoftmaxCPD
 from cognitive_arch.affordances.trials import ACTIONS, N_BINS, Floats, Ints, TrialTable, joined
 
@@ -61,12 +62,13 @@ class ActionCPD:
 
 @dataclass(eq=False)
 class MixtureModel:
-    """`weights` (actions, 3) of the parts, `exponents` (actions,) (sharper above 1), `ratio` (actions, 5, 5)
+    """`weights` (actions, 4) of the parts, `exponents` (actions,) (sharper above 1), `ratio` (actions, 5, 5)
     the dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
 
     action: ActionCPD
     softmax: SoftmaxCPD
     forest: ForestCPD
+    process: ProcessCPD
     weights: Floats
     exponents: Floats
     ratio: Floats
@@ -109,7 +111,7 @@ class MixtureModel:
         return answer
 
     def _joint(self, table: TrialTable) -> Floats:
-        each = _marginals((self.action, self.softmax, self.forest), table)
+        each = _marginals((self.action, self.softmax, self.forest, self.process), table)
         mixed = _sharpened(_mixed(each, self.weights, table), self.exponents[table.action])
         return coupled(mixed, self.ratio[table.action])
 
@@ -119,7 +121,7 @@ class MixtureModel:
         A model that was loaded from a file has no trials: give it those it was learned from.
         """
         self.seen = table if self.seen is None else joined([self.seen, table])
-        self.action, self.softmax, self.forest = _fit_parts(self.seen, rng, self.softmax)
+        self.action, self.softmax, self.forest, self.process = _fit_parts(self.seen, rng, self.softmax)
 
     def to_json(self) -> dict[str, Any]:
         """See `EffectModel`; the trials themselves are left out."""
@@ -127,6 +129,7 @@ class MixtureModel:
             "action": self.action.probabilities.tolist(),
             "softmax": self.softmax.to_json(),
             "forest": self.forest.to_json(),
+            "process": self.process.to_json(),
             "weights": self.weights.tolist(),
             "exponents": self.exponents.tolist(),
             "ratio": self.ratio.tolist(),
@@ -140,14 +143,16 @@ class MixtureModel:
             ActionCPD(np.array(data["action"])),
             SoftmaxCPD.from_json(data["softmax"]),
             ForestCPD.from_json(data["forest"]),
-            np.broadcast_to(np.array(data["weights"], dtype=np.float64), (len(ACTIONS), 3)),
+            ProcessCPD.from_json(data["process"]),
+            np.array(data["weights"]),
             np.array(data["exponents"]),
             np.array(data["ratio"]),
             np.array(data["places"]).reshape(-1, 2),
         )
 
 
-Parts = tuple[ActionCPD, SoftmaxCPD, ForestCPD]
+Parts = tuple[ActionCPD, SoftmaxCPD, ForestCPD, ProcessCPD]
+PARTS = 4
 
 
 def _fit_parts(
@@ -157,18 +162,19 @@ def _fit_parts(
         ActionCPD.fit(table),
         SoftmaxCPD.fit(table, start=guess),
         ForestCPD.fit(table, rng, trees),
+        ProcessCPD.fit(table, rng),
     )
 
 
 def _marginals(parts: Parts, table: TrialTable) -> Floats:
-    """p(bin) of each part along x and y of each row, (3, n, 2, 5).
+    """p(bin) of each part along x and y of each row, (4, n, 2, 5).
 
     Trees take what is unlike anything they were shown for the nearest of it, be it ever so far. They are
     trusted as far as the things are familiar; beyond that the softmax speaks, which then knows averages only.
     """
-    action, soft, forest = (part.marginals(table) for part in parts)
+    action, soft, forest, process = (part.marginals(table) for part in parts)
     trust = parts[1].familiarity(table)[:, None, None]
-    return np.stack([action, soft, trust * forest + (1 - trust) * soft])
+    return np.stack([action, soft, trust * forest + (1 - trust) * soft, process])
 
 
 def _folds(table: TrialTable, rng: np.random.Generator) -> Ints:
@@ -181,9 +187,9 @@ def _folds(table: TrialTable, rng: np.random.Generator) -> Ints:
 
 
 def _held_out(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD) -> Floats:
-    """Predictions of each part for each row by parts that were not shown it, (3, n, 2, 5)."""
+    """Predictions of each part for each row by parts that were not shown it, (4, n, 2, 5)."""
     fold = _folds(table, rng)
-    answer = np.full((3, len(table), 2, N_BINS), 1 / N_BINS)
+    answer = np.full((PARTS, len(table), 2, N_BINS), 1 / N_BINS)
     for k in range(FOLDS):
         out = fold == k
         if out.any() and not out.all():
@@ -193,13 +199,13 @@ def _held_out(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD) ->
 
 
 def _mixed(each: Floats, weights: Floats, table: TrialTable) -> Floats:
-    """Predictions (3, n, 2, 5) of the parts, weighted as each row's action has it, (n, 2, 5)."""
+    """Predictions (4, n, 2, 5) of the parts, weighted as each row's action has it, (n, 2, 5)."""
     mixed: Floats = np.einsum("nk,knxb->nxb", weights[table.action], each)
     return mixed
 
 
 def _weights_by_action(held_out: Floats, table: TrialTable) -> Floats:
-    """Weights of the mixture, (actions, 3): those of all trials count as `SHARED_WEIGHTS` trials of each."""
+    """Weights of the mixture, (actions, 4): those of all trials count as `SHARED_WEIGHTS` trials of each."""
     parts = len(held_out)
     overall = _weights(held_out, table.bins, np.ones(parts))
     prior = overall * SHARED_WEIGHTS
@@ -212,7 +218,7 @@ def _weights_by_action(held_out: Floats, table: TrialTable) -> Floats:
 
 
 def _weights(held_out: Floats, bins: Ints, prior: Floats, steps: int = 100) -> Floats:
-    """Weights of the mixture by expectation-maximisation, (3,); `prior` (3,) counts like trials."""
+    """Weights of the mixture by expectation-maximisation, (4,); `prior` (4,) counts like trials."""
     rows = np.arange(len(bins))
     likelihood = np.stack([held_out[:, rows, axis, bins[:, axis]] for axis in range(2)], axis=2).reshape(
         len(held_out), -1

@@ -219,8 +219,10 @@ def _claim(config: ExploreConfig, out: Path, command: str) -> None:
             f"{out} is not a file of this exploration (there is no {path.name} beside it); take another --out"
         )
     manifest = {"format": FORMAT, "command": command, "config": asdict(config), "versions": versions()}
+    draft = path.with_name(path.name + ".part")
     try:
-        path.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+        draft.write_text(json.dumps(manifest, indent=1) + "\n", encoding="utf-8")
+        draft.replace(path)
     except OSError as error:
         raise ExplorationError(f"cannot write {path}: {error.strerror}") from None
 

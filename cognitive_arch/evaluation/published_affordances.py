@@ -100,7 +100,7 @@ def table9(options: Options) -> Reproduced:
             name: _scores(assess(iter([split]), name, "leave-one-object-out", options.seed))
             for name in _beside(TABLE9)
         }
-        notes.append(f"learned from seven objects, tested on the eighth ({explored.HELD_OUT})")
+        notes.append(f"learned from objects of seven forms, tested on the eighth ({explored.HELD_OUT})")
     else:
         rows = _networks(table, TABLE9, "leave-one-object-out", options)
     best = max(TABLE9, key=lambda name: rows[name]["accuracy"])

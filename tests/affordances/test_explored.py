@@ -16,7 +16,9 @@ def test_the_trials_come_along_with_everything_that_was_tried() -> None:
     assert table.source == "explored"
     assert table.has_start
     assert set(table.action) == set(range(len(ACTIONS)))
-    assert len(set(table.object)) == 8
+    forms = {name.split("-")[-1].lower() for name in set(table.object)}
+    assert len(forms) == 8
+    assert len(set(table.object)) == 3 * 7 + 1
     assert len(set(table.manipulator[table.kind == "tool"])) >= 8
     assert set(table.manipulator[table.kind == "hand"]) == {"straight", "bent", "arched"}
     assert np.isfinite(np.hstack([table.shape_m, table.shape_h, table.shape_o])).all()
@@ -51,3 +53,17 @@ def test_effects_are_those_of_the_actions() -> None:
     assert np.median(some("tapFromRight")[:, 1]) < -0.025
     assert (some("pull", "Rake", "Wide-rake", "Hook-left", "Hook-right")[:, 0] > 0.025).mean() > 0.8
     assert (some("pull", "Stick", "Short-stick", "Thick-stick", "straight")[:, 0] > 0.025).mean() < 0.1
+
+
+@pytest.mark.parametrize(("axis", "action"), [(1, "tapFromLeft"), (0, "pull"), (0, "push")])
+def test_how_far_things_go_depends_on_what_they_are(axis: int, action: str) -> None:
+    """Were it all the same, nothing could be learned of shapes."""
+    table = read_explored("explored-tool")
+    bins = table.bins[table.action == ACTIONS.index(action), axis]
+    assert np.bincount(bins, minlength=5).max() / len(bins) < 0.6
+
+
+def test_hands_and_tools_were_tried_by_chances_of_their_own() -> None:
+    hands, tools = read_explored("explored-hand"), read_explored("explored-tool")
+    places = {tuple(place) for place in hands.start.round(4).tolist()}
+    assert len(places & {tuple(place) for place in tools.start.round(4).tolist()}) < 5

@@ -1,0 +1,172 @@
+"""p(effect | action, manipulator, object, start) by way of how far things go: Gaussian process regression.
+
+Displacements are continuous and change smoothly with shapes: a broader bar taps a little farther. For each
+action and axis the displacement is a Gaussian process over all descriptors and the place, with noise; the
+probability of a bin is how much of the predicted normal distribution lies in it. So what is known of things
+of other sizes carries over to one in between.
+
+The process is approximated by Bayesian linear regression on likenesses to some of the trials (Nystroem); what
+variance the approximation loses is given back, so that of something unlike everything tried little is said.
+Length scale, noise and amplitude are those with the greatest evidence (Rasmussen and Williams 2006, Ch. 5).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy.special import ndtr
+
+from cognitive_arch.affordances.features import Scaling, Similarity, polar
+from cognitive_arch.affordances.trials import ACTIONS, EDGES, N_BINS, Floats, TrialTable
+
+LENGTHS = (0.7, 1.4, 2.8)
+"""Length scales to choose from, times the root of the number of inputs."""
+RATIOS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
+"""Of the variance of noise by that of the process, to choose from."""
+CENTRES = 100
+LIMIT = 3.0  # standard deviations; inputs are cut off there
+LEAST_NOISE = 0.004  # m, standard deviation: displacements are not known better
+
+
+class Regression(NamedTuple):
+    """Of each action and axis: `mean` (actions, 2), `weights` (actions, 2, c), their `covariance` (actions,
+    2, c, c), variances of the process and of noise (actions, 2), in metres and square metres."""
+
+    mean: Floats
+    weights: Floats
+    covariance: Floats
+    process: Floats
+    noise: Floats
+
+
+@dataclass(frozen=True, eq=False)
+class ProcessCPD:
+    """`scale` and `like` make features of inputs: descriptors, and the place if `with_start`."""
+
+    scale: Scaling
+    like: Similarity
+    found: Regression
+    with_start: bool
+
+    @classmethod
+    def fit(cls, table: TrialTable, rng: np.random.Generator) -> ProcessCPD:
+        """The length scale is chosen for all actions, noise and amplitude for each action and axis."""
+        inputs = _inputs(table, table.has_start)
+        scale = Scaling.of(inputs, LIMIT, robust=False)
+        scaled = scale(inputs)
+        different = np.unique(scaled, axis=0)
+        centres = different[np.sort(rng.permutation(len(different))[:CENTRES])]
+        best: tuple[float, Similarity, Regression] | None = None
+        for length in LENGTHS:
+            like = Similarity.at(centres, length * np.sqrt(inputs.shape[1]))
+            evidence, found = _regressed(like(scaled), table)
+            if best is None or evidence > best[0]:
+                best = evidence, like, found
+        assert best is not None
+        return cls(scale, best[1], best[2], table.has_start)
+
+    def marginals(self, table: TrialTable) -> Floats:
+        """p(bin) along x and y of each row, (n, 2, 5)."""
+        features = self.like(self.scale(_inputs(table, self.with_start)))
+        lost = np.maximum(1.0 - (features**2).sum(axis=1), 0.0)
+        answer = np.zeros((len(table), 2, N_BINS))
+        for action in np.unique(table.action):
+            rows = table.action == action
+            part = features[rows]
+            for axis in range(2):
+                mean = self.found.mean[action, axis] + part @ self.found.weights[action, axis]
+                spread = ((part @ self.found.covariance[action, axis]) * part).sum(axis=1)
+                variance = np.maximum(spread, 0.0) + self.found.process[action, axis] * lost[rows]
+                variance += self.found.noise[action, axis]
+                answer[rows, axis] = _in_bins(mean, np.sqrt(variance))
+        return answer
+
+    def to_json(self) -> dict[str, Any]:
+        """Plain data."""
+        return {
+            "scale": self.scale.to_json(),
+            "like": self.like.to_json(),
+            **{name: part.tolist() for name, part in self.found._asdict().items()},
+            # Many numbers, on which little hangs but how sure the answers are.
+            "covariance": [float(f"{value:.3g}") for value in self.found.covariance.ravel()],
+            "with_start": self.with_start,
+        }
+
+    @classmethod
+    def from_json(cls, data: Mapping[str, Any]) -> ProcessCPD:
+        """From `to_json`."""
+        parts = {name: np.array(data[name], np.float64) for name in Regression._fields}
+        weights = parts["weights"]
+        parts["covariance"] = parts["covariance"].reshape(*weights.shape, weights.shape[2])
+        return cls(
+            Scaling.from_json(data["scale"]),
+            Similarity.from_json(data["like"]),
+            Regression(**parts),
+            bool(data["with_start"]),
+        )
+
+
+def _inputs(table: TrialTable, with_start: bool) -> Floats:
+    parts = [table.shape_m, table.shape_o]
+    if with_start:
+        parts.append(polar(table.start))
+    return np.hstack(parts)
+
+
+def _in_bins(mean: Floats, deviation: Floats) -> Floats:
+    """How much of normal distributions (n,) lies in each bin, (n, 5)."""
+    below = ndtr((np.asarray(EDGES)[None] - mean[:, None]) / deviation[:, None])
+    padded = np.column_stack([np.zeros(len(mean)), below, np.ones(len(mean))])
+    return np.diff(padded, axis=1).reshape(len(mean), N_BINS)
+
+
+def _regressed(features: Floats, table: TrialTable) -> tuple[float, Regression]:
+    """Bayesian linear regression of the displacements on `features` (n, c), and its log evidence."""
+    c = features.shape[1]
+    shape = (len(ACTIONS), 2)
+    found = Regression(
+        np.zeros(shape), np.zeros((*shape, c)), np.zeros((*shape, c, c)), np.ones(shape), np.ones(shape)
+    )
+    evidence = 0.0
+    for action in range(len(ACTIONS)):
+        rows = table.action == action
+        effect = table.effect[rows] if rows.any() else table.effect
+        found.mean[action] = effect.mean(axis=0)
+        if not rows.any():
+            found.noise[action] = effect.var(axis=0) + LEAST_NOISE**2
+            found.process[action] = 0.0
+            continue
+        part, rest = features[rows], effect - effect.mean(axis=0)
+        roots, axes = np.linalg.eigh(part.T @ part)
+        roots = np.maximum(roots, 0.0)
+        for axis in range(2):
+            value, ratio, process = _best_ratio(roots, axes.T @ (part.T @ rest[:, axis]), rest[:, axis])
+            evidence += value
+            turned = axes / (roots + ratio)
+            found.weights[action, axis] = turned @ (axes.T @ (part.T @ rest[:, axis]))
+            found.process[action, axis] = process
+            found.noise[action, axis] = ratio * process
+            found.covariance[action, axis] = ratio * process * (turned @ axes.T)
+    return evidence, found
+
+
+def _best_ratio(roots: Floats, projected: Floats, rest: Floats) -> tuple[float, float, float]:
+    """The log evidence of the best of `RATIOS`, that ratio, and the variance of the process with it.
+
+    `roots` (c,) are eigenvalues of the features' scatter, `projected` (c,) the features' products with the
+    displacements `rest` (n,) along its axes.
+    """
+    best = (-np.inf, 1.0, 1.0)
+    n = len(rest)
+    for ratio in RATIOS:
+        # Of N(0, process * (features features' + ratio I)), by the matrix inversion and determinant lemmas.
+        fit = float(rest @ rest) - float((projected**2 / (roots + ratio)).sum())
+        process = max(fit / ratio / n, LEAST_NOISE**2 / ratio)
+        determinant = float(np.log1p(roots / ratio).sum()) + n * np.log(ratio)
+        value = -0.5 * (fit / ratio / process + determinant + n * np.log(process))
+        if value > best[0]:
+            best = (value, ratio, process)
+    return best
