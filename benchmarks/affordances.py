@@ -184,18 +184,15 @@ def own_exploration() -> None:
     table = read_explored("explored-tool")
     print("\nthe robot's own trials with tools, leave-one-object-out")
     found = {model: evaluate(table, model, "leave-one-object-out", 0, 0) for model in (*MODELS, *BESIDE)}
-    for model, one in found.items():
+    for one in found.values():
         _line(one, "")
     default = found["default"].mean("accuracy")
     for model in ("pca", "pca-two-blocks"):
         ahead = default - found[model].mean("accuracy")
         row(f"  default ahead of {model}", f"{100 * ahead:.1f} points", ">= 5 points")
     beside = max(BESIDE, key=lambda model: found[model].mean("accuracy"))
-    row(
-        f"  default ahead of {beside}",
-        f"{100 * (default - found[beside].mean('accuracy')):.1f} points",
-        "> 0",
-    )
+    ahead = default - found[beside].mean("accuracy")
+    row(f"  default ahead of {beside}", f"{100 * ahead:.1f} points", "> 0")
     pulling("the robot's own trials", read_explored())
 
 

@@ -5,9 +5,10 @@
 The parts are the action's own distribution (a Dirichlet estimate), the hierarchical softmax, the ensemble of
 tree CPDs, and the Gaussian process of how far things go. The weights are found by expectation-maximisation
 on predictions for trials that the parts have not seen: folds of the training trials, by object where there
-are enough of them, for it is new things that the robot asks about. Each action has weights of its own, drawn towards those of all: whether a pull works
-hangs on the tool, whether a push does hardly. So is found one exponent per action, which makes the
-distributions as sure as they are right, and the dependence between the two effects.
+are enough of them, for it is new things that the robot asks about. Each action has weights of its own, drawn
+towards those of all: whether a pull works hangs on the tool, whether a push does hardly. So is found an
+exponent per action and axis, which makes the distributions as sure as they are right, and the dependence
+between the two effects.
 """
 
 from __future__ import annotations
@@ -62,8 +63,8 @@ class ActionCPD:
 
 @dataclass(eq=False)
 class MixtureModel:
-    """`weights` (actions, 4) of the parts, `exponents` (actions,) (sharper above 1), `ratio` (actions, 5, 5)
-    the dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
+    """`weights` (actions, 4) of the parts, `exponents` (actions, 2) (sharper above 1), `ratio` (actions, 5,
+    5) the dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
 
     action: ActionCPD
     softmax: SoftmaxCPD
@@ -232,28 +233,29 @@ def _weights(held_out: Floats, bins: Ints, prior: Floats, steps: int = 100) -> F
 
 
 def _sharpened(marginals: Floats, exponent: Floats) -> Floats:
-    """Marginals (n, 2, 5) to the power of `exponent` (n,), normalised again."""
-    raised = marginals ** exponent[:, None, None]
+    """Marginals (n, axes, 5) to the power of `exponent` (n, axes), normalised again."""
+    raised = marginals ** exponent[:, :, None]
     sharpened: Floats = raised / raised.sum(axis=2, keepdims=True)
     return sharpened
 
 
 def _exponents(marginals: Floats, table: TrialTable) -> Floats:
-    """For each action the exponent under which the held-out bins are most likely, (actions,)."""
-    found = np.ones(len(ACTIONS))
+    """For each action and axis the exponent under which the held-out bins are most likely, (actions, 2)."""
+    found = np.ones((len(ACTIONS), 2))
     for action in range(len(ACTIONS)):
         rows = table.action == action
-        if rows.any():
-            found[action] = _exponent(marginals[rows], table.bins[rows])
+        for axis in range(2) if rows.any() else ():
+            found[action, axis] = _exponent(marginals[rows, axis], table.bins[rows, axis])
     return found
 
 
 def _exponent(marginals: Floats, bins: Ints) -> float:
+    """For marginals (n, 5) and bins (n,)."""
     rows = np.arange(len(bins))
 
     def loss(log_exponent: float) -> float:
-        p = _sharpened(marginals, np.full(len(bins), np.exp(log_exponent)))
-        found = sum(np.log(p[rows, axis, bins[:, axis]] + 1e-12).sum() for axis in range(2))
+        p = _sharpened(marginals[:, None], np.full((len(bins), 1), np.exp(log_exponent)))[:, 0]
+        found = np.log(p[rows, bins] + 1e-12).sum()
         return 0.5 * (log_exponent / EXPONENT_WIDTH) ** 2 - float(found)
 
     return float(np.exp(minimize_scalar(loss, bounds=(-1.1, 1.1), method="bounded").x))

@@ -39,8 +39,8 @@ def learned() -> ProcessCPD:
 
 
 def test_sizes_in_between_are_foreseen(learned: ProcessCPD) -> None:
-    """No thing of 1.7, 2.5 or 3.6 cm was tried, so no tree could tell a bin for it by its like."""
-    new = sized(np.repeat([0.017, 0.025, 0.036], 30), seed=2)
+    """No thing of 1.5 or 3.5 cm was tried, so no tree could tell a bin for it by its like."""
+    new = sized(np.repeat([0.015, 0.035], 30), seed=2)
     found = learned.marginals(new)
     assert np.allclose(found.sum(axis=2), 1)
     assert (found >= 0).all()
