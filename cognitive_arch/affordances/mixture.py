@@ -64,7 +64,7 @@ class ActionCPD:
 @dataclass(eq=False)
 class MixtureModel:
     """`weights` (actions, 4) of the parts, `exponents` (actions, 2) (sharper above 1), `ratio` (actions, 5,
-    5) the dependence of the effects, `places` (k, 2) metres to average over. `seen` is what it learned from."""
+    5) the dependence of the effects, `places` (k, 2) metres to average over, `seen` what it learned from."""
 
     action: ActionCPD
     softmax: SoftmaxCPD
