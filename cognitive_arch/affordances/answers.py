@@ -17,7 +17,7 @@ from cognitive_arch.affordances.model import marginals_of
 from cognitive_arch.affordances.networks import NetworkModel
 from cognitive_arch.affordances.published import READERS, read_published
 from cognitive_arch.affordances.queries import Oracle, Place, Thing, goal_mask, matrix_text
-from cognitive_arch.affordances.registry import BASELINES, MODELS, Affordances
+from cognitive_arch.affordances.registry import BASELINES, MODELS, Affordances, check_place
 from cognitive_arch.affordances.sight import HALVES, is_picture, seen_thing
 from cognitive_arch.affordances.trials import ACTIONS, BINS, Floats, TrialTable, read_trials
 from cognitive_arch.errors import AffordanceError, one_line, unknown
@@ -60,6 +60,8 @@ def learn(
     if model in BASELINES and out is not None and model != "majority":
         valid = [name for name in MODELS if name not in ("forest", "logistic")]
         raise AffordanceError(f"'{model}' is for comparison and cannot be saved; valid: {', '.join(valid)}")
+    if out is not None:
+        check_place(out)
     started = time.perf_counter()
     learned = Affordances.learn(table, model, np.random.default_rng(seed))
     seconds = time.perf_counter() - started

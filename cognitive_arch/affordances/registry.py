@@ -57,11 +57,8 @@ class Affordances:
             model,
             table.names_m,
             table.names_o,
-            {
-                str(n): table.shape_m[table.manipulator == n].mean(axis=0)
-                for n in np.unique(table.manipulator)
-            },
-            {str(n): table.shape_o[table.object == n].mean(axis=0) for n in np.unique(table.object)},
+            _means(table.manipulator, table.shape_m),
+            _means(table.object, table.shape_o),
             len(np.unique(table.trial)),
             table.source,
         )
@@ -87,18 +84,7 @@ class Affordances:
     def load(cls, path: Path | str) -> Affordances:
         """Read what `save` wrote; raises `AffordanceError` for anything else."""
         path = Path(path)
-        try:
-            kept = path.read_bytes()
-        except OSError:
-            raise AffordanceError(f"there is no learned model at '{one_line(path)}'") from None
-        try:
-            data = json.loads(gzip.decompress(kept) if path.suffix == ".gz" else kept)
-        except (ValueError, OSError, EOFError, zlib.error) as error:
-            raise AffordanceError(f"'{one_line(path.name)}' is no learned model: {one_line(error)}") from None
-        if not isinstance(data, dict) or data.get("format") != FORMAT:
-            raise AffordanceError(
-                f"'{one_line(path.name)}' is no learned model; valid: a file of `cogarch learn networks`"
-            )
+        data = _kept(path)
         try:
             return cls(
                 data["model"],
@@ -112,6 +98,35 @@ class Affordances:
             )
         except (KeyError, TypeError, ValueError) as error:
             raise AffordanceError(f"'{one_line(path.name)}' is incomplete: {one_line(error)}") from None
+
+
+def _kept(path: Path) -> dict[str, Any]:
+    """What is in a file of a learned model, of whatever version; raises `AffordanceError` for other files."""
+    try:
+        kept = path.read_bytes()
+    except OSError:
+        raise AffordanceError(f"there is no learned model at '{one_line(path)}'") from None
+    try:
+        data = json.loads(gzip.decompress(kept) if path.suffix == ".gz" else kept)
+    except (ValueError, OSError, EOFError, zlib.error) as error:
+        raise AffordanceError(f"'{one_line(path.name)}' is no learned model: {one_line(error)}") from None
+    if not isinstance(data, dict) or data.get("format") != FORMAT:
+        raise AffordanceError(
+            f"'{one_line(path.name)}' is no learned model; valid: a file of `cogarch learn networks`"
+        )
+    return data
+
+
+def check_place(path: Path) -> None:
+    """Raises `AffordanceError` where a model must not be kept, as something else is there."""
+    if not path.exists():
+        return
+    try:
+        _kept(path)
+    except AffordanceError:
+        raise AffordanceError(
+            f"'{one_line(path)}' holds something else than a learned model; take another --out"
+        ) from None
 
 
 def _means(names: Names, shapes: Floats) -> dict[str, Floats]:

@@ -195,6 +195,7 @@ def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tm
         (["learn", "networks", "TRIALS", "--protocol", "none"], "unknown protocol 'none'"),
         (["learn", "networks", "TRIALS", "--model", "forest", "--out", "f.json"], "for comparison"),
         (["learn", "networks", "TRIALS", "--reliability", "r.png"], "needs --evaluate"),
+        (["learn", "networks", "TRIALS", "--out", "TRIALS"], "holds something else than a learned model"),
         (["query", "TRIALS"], "is no learned model"),
         (["reproduce", "table10"], "never published"),
         (["reproduce", "table9", "--trials", "absent.csv"], "no file of trials"),
@@ -202,8 +203,10 @@ def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tm
     ],
 )
 def test_bad_calls_end_with_one_line(cogarch: Any, files: Path, arguments: list[str], message: str) -> None:
+    before = (files / "trials.csv").read_bytes()
     found = cogarch(*[str(files / "trials.csv") if a == "TRIALS" else a for a in arguments])
     assert (found.code, found.out) == (2, "")
+    assert (files / "trials.csv").read_bytes() == before
     assert message in found.err
     assert len(found.err.strip().splitlines()) == 1
 
