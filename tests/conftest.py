@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,12 @@ from cognitive_arch.domain import Domain, load_domain
 from cognitive_arch.relational.parser import load_rules
 from cognitive_arch.relational.rules import Entity, GroundRule, RuleSet
 from cognitive_arch.relational.symbols import Goal, GroundAction, State, parse_literal
+
+
+def patience(seconds: float) -> float:
+    """How long to wait for what takes `seconds` on an idle machine: as many times longer as it is busier."""
+    return seconds * max(1.0, 2 * os.getloadavg()[0] / (os.cpu_count() or 1))
+
 
 HANDS = ("LeftHand", "RightHand")
 PARTS = ("Bun-bottom", "Bun-top", "Ham")

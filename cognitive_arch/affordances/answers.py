@@ -37,6 +37,9 @@ def load_table(trials: str, data: Path | None) -> TrialTable:
     return read_trials(trials)
 
 
+GRAPHS = (".png", ".svg", ".dot", ".bif")
+
+
 @dataclass(frozen=True)
 class Study:
     """How to evaluate: `splits` 0 for not at all; a reliability diagram goes to `figure`."""
@@ -60,8 +63,12 @@ def learn(
     if model in BASELINES and out is not None and model != "majority":
         valid = [name for name in MODELS if name not in ("forest", "logistic")]
         raise AffordanceError(f"'{model}' is for comparison and cannot be saved; valid: {', '.join(valid)}")
+    if seed < 0:
+        raise AffordanceError(f"seed {seed}; valid: 0 or more")
     if out is not None:
         check_place(out)
+    if graph is not None:
+        _check_graph(model, graph)
     started = time.perf_counter()
     learned = Affordances.learn(table, model, np.random.default_rng(seed))
     seconds = time.perf_counter() - started
@@ -113,13 +120,20 @@ def _reliability(found: Sequence[Evaluation], path: Path) -> Path:
     )
 
 
+def _check_graph(model: str, path: Path) -> None:
+    """Before anything is learned."""
+    networks = [name for name, kind in MODELS.items() if issubclass(kind, NetworkModel)]
+    if model in MODELS and model not in networks:
+        raise AffordanceError(f"'{model}' is no graph; valid: {', '.join(networks)}")
+    if path.suffix not in GRAPHS:
+        raise AffordanceError(f"'{one_line(path.name)}' is no graph; valid: {', '.join(GRAPHS)}")
+
+
 def _graph(learned: Affordances, path: Path) -> Path:
     """The graph (.png, .svg, .dot), or the network itself for other programs (.bif)."""
     from cognitive_arch.affordances.figures import graph_picture
 
-    if not isinstance(learned.model, NetworkModel):
-        networks = [name for name, kind in MODELS.items() if issubclass(kind, NetworkModel)]
-        raise AffordanceError(f"'{learned.name}' is no graph; valid: {', '.join(networks)}")
+    assert isinstance(learned.model, NetworkModel)  # see `_check_graph`
     network = learned.model.networks[0]
     if path.suffix == ".bif":
         network.save(path)

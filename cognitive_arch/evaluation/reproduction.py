@@ -17,7 +17,8 @@ class Options:
     """What a reproduction may use: `out` is a folder for its files, `data` one with data sets.
 
     `episodes` (or splits) is None for as many as published; `jobs` processes may share the work. `trials` is
-    a file of affordance trials, `protocol` how they are split (see `affordances.evaluation`).
+    a file of affordance trials, `protocol` how they are split (see `affordances.evaluation`). Raises
+    `ConfigError` for a seed or a number of processes there cannot be.
     """
 
     out: Path
@@ -29,6 +30,12 @@ class Options:
     protocol: str = "trial"
     on_progress: Callable[[int, int], None] = lambda done, total: None
     on_notice: Callable[[str], None] = lambda text: None
+
+    def __post_init__(self) -> None:
+        if self.seed < 0:
+            raise ConfigError(f"seed {self.seed}; valid: 0 or more")
+        if not 1 <= self.jobs <= 1024:
+            raise ConfigError(f"{self.jobs} jobs; valid: 1 to 1024")
 
 
 @dataclass(frozen=True, slots=True)

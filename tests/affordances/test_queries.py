@@ -196,6 +196,13 @@ def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tm
         (["learn", "networks", "TRIALS", "--model", "forest", "--out", "f.json"], "for comparison"),
         (["learn", "networks", "TRIALS", "--reliability", "r.png"], "needs --evaluate"),
         (["learn", "networks", "TRIALS", "--out", "TRIALS"], "holds something else than a learned model"),
+        (["learn", "networks", "TRIALS", "--seed", "-1"], "seed -1; valid: 0 or more"),
+        (
+            ["learn", "networks", "TRIALS", "--model", "k2", "--graph", "g.pdf"],
+            "valid: .png, .svg, .dot, .bif",
+        ),
+        (["reproduce", "fig46", "--seed", "-4"], "seed -4; valid: 0 or more"),
+        (["reproduce", "fig46", "--jobs", "0"], "0 jobs; valid: 1 to 1024"),
         (["query", "TRIALS"], "is no learned model"),
         (["reproduce", "table10"], "never published"),
         (["reproduce", "table9", "--trials", "absent.csv"], "no file of trials"),
