@@ -3,8 +3,8 @@
 Each of the four actions is one fixed movement in a straight line, whatever is in the hand: nothing is
 refused because a tool does not suit. Taps and pushes begin beside or before the object, pulls behind it:
 the shaft of a tool lies beside the object then, on the side where more of the tool's head is, and a bare
-hand reaches over it. The middle of the tool's head, or the finger tips, are taken to a fixed place a
-little beyond where the object's middle was; so it depends on the shapes of both how far the object goes,
+hand reaches over it. The middle of the tool's head, or the finger tips, are taken to a fixed place near
+where the object's middle was; so it depends on the shapes of both how far the object goes,
 if it goes at all. A little of everything is left to chance: where the object stands and how it is turned,
 how well the robot aims, how far it moves, friction.
 

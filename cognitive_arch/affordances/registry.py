@@ -97,7 +97,10 @@ class Affordances:
                 str(data["source"]),
             )
         except (KeyError, TypeError, ValueError) as error:
-            raise AffordanceError(f"'{one_line(path.name)}' is incomplete: {one_line(error)}") from None
+            raise AffordanceError(
+                f"'{one_line(path.name)}' is incomplete, or of another version ({one_line(error)}); "
+                "learn it again: cogarch learn networks"
+            ) from None
 
 
 def _kept(path: Path) -> dict[str, Any]:
@@ -108,7 +111,7 @@ def _kept(path: Path) -> dict[str, Any]:
         raise AffordanceError(f"there is no learned model at '{one_line(path)}'") from None
     try:
         data = json.loads(gzip.decompress(kept) if path.suffix == ".gz" else kept)
-    except (ValueError, OSError, EOFError, zlib.error) as error:
+    except (ValueError, OSError, EOFError, RecursionError, zlib.error) as error:
         raise AffordanceError(f"'{one_line(path.name)}' is no learned model: {one_line(error)}") from None
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise AffordanceError(
@@ -119,8 +122,8 @@ def _kept(path: Path) -> dict[str, Any]:
 
 def check_place(path: Path) -> None:
     """Raises `AffordanceError` where a model must not be kept, as something else is there."""
-    if not path.exists():
-        return
+    if not path.is_file() or not path.stat().st_size:
+        return  # devices, too, may be written to
     try:
         _kept(path)
     except AffordanceError:

@@ -59,7 +59,7 @@ def estimate_background(image: Image, ignore: NDArray[np.bool_] | None = None) -
     """The commonest colour of `image` (height, width, 3), whatever its brightness, where `ignore` (height,
     width) is not true; None where all is ignored."""
     height, width = image.shape[:2]
-    step = math.ceil(math.sqrt(height * width / SAMPLES))
+    step = max(1, math.ceil(math.sqrt(height * width / SAMPLES)))
     pixels = image[::step, ::step].reshape(-1, 3)
     if ignore is not None:
         pixels = pixels[~ignore[::step, ::step].ravel().astype(np.bool_)]

@@ -83,7 +83,7 @@ def see(
         mask = np.where(ignore, 0, mask).astype(np.uint8)
     seen = []
     for blob in label_blobs(mask, min_area).blobs:
-        described = describe(blob.mask, formulas, blob.contour - blob.bbox[:2])
+        described = describe(blob.mask, formulas, blob.contour - np.array(blob.bbox[:2], np.int32))
         label, probability = _name(image, blob, found, recogniser)
         seen.append(SeenBlob(blob, described, label, probability))
     return seen

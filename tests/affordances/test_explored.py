@@ -61,9 +61,3 @@ def test_how_far_things_go_depends_on_what_they_are(axis: int, action: str) -> N
     table = read_explored("explored-tool")
     bins = table.bins[table.action == ACTIONS.index(action), axis]
     assert np.bincount(bins, minlength=5).max() / len(bins) < 0.6
-
-
-def test_hands_and_tools_were_tried_by_chances_of_their_own() -> None:
-    hands, tools = read_explored("explored-hand"), read_explored("explored-tool")
-    places = {tuple(place) for place in hands.start.round(4).tolist()}
-    assert len(places & {tuple(place) for place in tools.start.round(4).tolist()}) < 5
