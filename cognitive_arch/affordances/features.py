@@ -74,13 +74,13 @@ class Scaling:
     def of(cls, values: Floats, limit: float, robust: bool = False) -> Scaling:
         """Centre and width of `values` (n, d): mean and standard deviation, or their robust counterparts
         (places of things that slipped out of sight are metres away)."""
-        if not np.isfinite(values).any():
-            return cls(np.zeros(values.shape[1]), np.ones(values.shape[1]), limit)
+        # A column of which nothing is known stays at 0.
+        known = np.where(np.isfinite(values).any(axis=0), values, 0.0)
         if robust:
-            centre = np.nanmedian(values, axis=0)
-            width = 1.4826 * np.nanmedian(np.abs(values - centre), axis=0)
+            centre = np.nanmedian(known, axis=0)
+            width = 1.4826 * np.nanmedian(np.abs(known - centre), axis=0)
         else:
-            centre, width = np.nanmean(values, axis=0), np.nanstd(values, axis=0)
+            centre, width = np.nanmean(known, axis=0), np.nanstd(known, axis=0)
         return cls(centre, np.where(width > 1e-9, width, 1.0), limit)
 
     def __call__(self, values: Floats) -> Floats:

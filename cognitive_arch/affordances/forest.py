@@ -34,14 +34,25 @@ class ForestCPD:
     with_start: bool
 
     @classmethod
-    def fit(cls, table: TrialTable, rng: np.random.Generator, trees: int = TREES, leaf: int = 3) -> ForestCPD:
-        """Grow trees with at least `leaf` trials in every leaf on both axes at once."""
+    def fit(
+        cls,
+        table: TrialTable,
+        rng: np.random.Generator,
+        trees: int = TREES,
+        leaf: int = 3,
+        with_start: bool | None = None,
+    ) -> ForestCPD:
+        """Grow trees with at least `leaf` trials in every leaf on both axes at once.
+
+        They look at the place if it is known of every trial, unless `with_start` says otherwise.
+        """
         from sklearn.ensemble import RandomForestRegressor
 
+        with_start = table.has_start if with_start is None else with_start
         grown = RandomForestRegressor(
             trees, min_samples_leaf=leaf, max_features=0.5, random_state=int(rng.integers(2**31))
         ).fit(
-            _inputs(table, table.has_start),
+            _inputs(table, with_start),
             np.hstack([soft_bins(table.effect[:, axis]) for axis in range(2)]),
         )
         parts = [estimator.tree_ for estimator in grown.estimators_]
@@ -55,7 +66,7 @@ class ForestCPD:
             np.concatenate([np.where(i, p.children_right + o, LEAF) for p, o, i in shifted]),
             np.concatenate([p.value[:, :, 0] for p in parts]),
             np.asarray(offsets, dtype=np.int64),
-            table.has_start,
+            with_start,
         )
 
     def marginals(self, table: TrialTable) -> Floats:

@@ -82,18 +82,14 @@ class MixtureModel:
 
         Of more than `MOST_ROWS` rows (mostly views of the same trials) as many are drawn.
         """
-        if len(table) > MOST_ROWS:
-            table = table.take(np.sort(rng.choice(len(table), MOST_ROWS, replace=False)))
+        table = _drawn(table, rng)
         parts = _fit_parts(table, rng)
         held_out = _held_out(table, rng, parts[1])
         weights = _weights_by_action(held_out, table)
         mixed = _mixed(held_out, weights, table)
         exponents = _exponents(mixed, table)
         ratio = coupling(_sharpened(mixed, exponents[table.action]), table)
-        places = table.start[np.isfinite(table.start).all(axis=1)]
-        if len(places) > PLACES:
-            places = places[rng.choice(len(places), PLACES, replace=False)]
-        return cls(*parts, weights, exponents, ratio, places, table)
+        return cls(*parts, weights, exponents, ratio, _places(table, rng), table)
 
     def joint(self, table: TrialTable) -> Floats:
         """See `EffectModel`."""
@@ -121,8 +117,9 @@ class MixtureModel:
 
         A model that was loaded from a file has no trials: give it those it was learned from.
         """
-        self.seen = table if self.seen is None else joined([self.seen, table])
+        self.seen = _drawn(table if self.seen is None else joined([self.seen, table]), rng)
         self.action, self.softmax, self.forest, self.process = _fit_parts(self.seen, rng, self.softmax)
+        self.places = _places(self.seen, rng)
 
     def to_json(self) -> dict[str, Any]:
         """See `EffectModel`; the trials themselves are left out."""
@@ -156,14 +153,31 @@ Parts = tuple[ActionCPD, SoftmaxCPD, ForestCPD, ProcessCPD]
 PARTS = 4
 
 
+def _drawn(table: TrialTable, rng: np.random.Generator) -> TrialTable:
+    """At most `MOST_ROWS` of the rows, in their order."""
+    if len(table) <= MOST_ROWS:
+        return table
+    return table.take(np.sort(rng.choice(len(table), MOST_ROWS, replace=False)))
+
+
+def _places(table: TrialTable, rng: np.random.Generator) -> Floats:
+    """Some of the places where things stood, (at most `PLACES`, 2)."""
+    places: Floats = table.start[np.isfinite(table.start).all(axis=1)]
+    return places if len(places) <= PLACES else places[rng.choice(len(places), PLACES, replace=False)]
+
+
 def _fit_parts(
-    table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD | None = None, trees: int = TREES
+    table: TrialTable,
+    rng: np.random.Generator,
+    guess: SoftmaxCPD | None = None,
+    trees: int = TREES,
+    with_start: bool | None = None,
 ) -> Parts:
     return (
         ActionCPD.fit(table),
         SoftmaxCPD.fit(table, start=guess),
-        ForestCPD.fit(table, rng, trees),
-        ProcessCPD.fit(table, rng),
+        ForestCPD.fit(table, rng, trees, with_start=with_start),
+        ProcessCPD.fit(table, rng, with_start),
     )
 
 
@@ -194,8 +208,9 @@ def _held_out(table: TrialTable, rng: np.random.Generator, guess: SoftmaxCPD) ->
     for k in range(FOLDS):
         out = fold == k
         if out.any() and not out.all():
-            rest = table.take(~out)
-            answer[:, out] = _marginals(_fit_parts(rest, rng, guess, TREES_FOR_WEIGHTS), table.take(out))
+            # The parts that are weighed look at the same as those that the weights are for.
+            parts = _fit_parts(table.take(~out), rng, guess, TREES_FOR_WEIGHTS, table.has_start)
+            answer[:, out] = _marginals(parts, table.take(out))
     return answer
 
 

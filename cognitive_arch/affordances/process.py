@@ -7,7 +7,9 @@ of other sizes carries over to one in between.
 
 The process is approximated by Bayesian linear regression on likenesses to some of the trials (Nystroem); what
 variance the approximation loses is given back, so that of something unlike everything tried little is said.
-Length scale, noise and amplitude are those with the greatest evidence (Rasmussen and Williams 2006, Ch. 5).
+Length scale, noise and amplitude are those with the greatest evidence (Rasmussen and Williams 2006, Ch. 5),
+amplitudes under an inverse gamma prior around the spread of all actions' effects together: of an action tried
+once or twice the spread is not what these trials happen to show. Rows of one trial (views) count as one.
 """
 
 from __future__ import annotations
@@ -26,9 +28,19 @@ LENGTHS = (0.7, 1.4, 2.8)
 """Length scales to choose from, times the root of the number of inputs."""
 RATIOS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Of the variance of noise by that of the process, to choose from."""
+RATIO_WIDTH = 1.5
+"""Prior standard deviation of a ratio's logarithm: a few trials cannot show that there is hardly any noise."""
 CENTRES = 100
 LIMIT = 3.0  # standard deviations; inputs are cut off there
-LEAST_NOISE = 0.004  # m, standard deviation: displacements are not known better
+LEAST_NOISE = 0.004
+"""Metres, standard deviation: a floor, not an estimate, under what the evidence says of the noise. Two trials
+that agree to the millimetre, as those of a simulation may, do not make the next one certain."""
+FARTHEST = 0.03
+"""Metres beyond the outermost edges at which displacements are cut off. The bin is the same, and one thing
+that rolled away does not tell how far others go."""
+PRIOR_TRIALS = 3.0
+"""As how many trials the spread of all actions' effects counts in the spread of each, and their mean in its
+mean."""
 
 
 class Regression(NamedTuple):
@@ -52,10 +64,14 @@ class ProcessCPD:
     with_start: bool
 
     @classmethod
-    def fit(cls, table: TrialTable, rng: np.random.Generator) -> ProcessCPD:
-        """The length scale is chosen for all actions, noise and amplitude for each action and axis."""
-        inputs = _inputs(table, table.has_start)
-        scale = Scaling.of(inputs, LIMIT, robust=False)
+    def fit(cls, table: TrialTable, rng: np.random.Generator, with_start: bool | None = None) -> ProcessCPD:
+        """The length scale is chosen for all actions, noise and amplitude for each action and axis.
+
+        The place is looked at if it is known of every trial, unless `with_start` says otherwise.
+        """
+        with_start = table.has_start if with_start is None else with_start
+        inputs = _inputs(table, with_start)
+        scale = _scaling(table, with_start)
         scaled = scale(inputs)
         different = np.unique(scaled, axis=0)
         centres = different[np.sort(rng.permutation(len(different))[:CENTRES])]
@@ -66,7 +82,7 @@ class ProcessCPD:
             if best is None or evidence > best[0]:
                 best = evidence, like, found
         assert best is not None
-        return cls(scale, best[1], best[2], table.has_start)
+        return cls(scale, best[1], best[2], with_start)
 
     def marginals(self, table: TrialTable) -> Floats:
         """p(bin) along x and y of each row, (n, 2, 5)."""
@@ -123,50 +139,74 @@ def _in_bins(mean: Floats, deviation: Floats) -> Floats:
     return np.diff(padded, axis=1).reshape(len(mean), N_BINS)
 
 
+def _scaling(table: TrialTable, with_start: bool) -> Scaling:
+    """Of `_inputs`; of places robustly, since what slipped out of sight is metres away."""
+    shapes = Scaling.of(np.hstack([table.shape_m, table.shape_o]), LIMIT)
+    if not with_start:
+        return shapes
+    places = Scaling.of(polar(table.start), LIMIT, robust=True)
+    return Scaling(np.append(shapes.centre, places.centre), np.append(shapes.width, places.width), LIMIT)
+
+
 def _regressed(features: Floats, table: TrialTable) -> tuple[float, Regression]:
     """Bayesian linear regression of the displacements on `features` (n, c), and its log evidence."""
     c = features.shape[1]
     shape = (len(ACTIONS), 2)
+    effect = np.clip(table.effect, EDGES[0] - FARTHEST, EDGES[-1] + FARTHEST)
+    _, trial, views = np.unique(table.trial, return_inverse=True, return_counts=True)
+    weight = 1.0 / views[trial]
+    usual = np.average(effect, axis=0, weights=weight)
+    spread = np.average((effect - usual) ** 2, axis=0, weights=weight) + LEAST_NOISE**2
     found = Regression(
-        np.zeros(shape), np.zeros((*shape, c)), np.zeros((*shape, c, c)), np.ones(shape), np.ones(shape)
+        np.tile(usual, (shape[0], 1)),
+        np.zeros((*shape, c)),
+        np.zeros((*shape, c, c)),
+        np.zeros(shape),
+        np.tile(spread, (shape[0], 1)),
     )
     evidence = 0.0
-    for action in range(len(ACTIONS)):
+    for action in np.unique(table.action):
         rows = table.action == action
-        effect = table.effect[rows] if rows.any() else table.effect
-        found.mean[action] = effect.mean(axis=0)
-        if not rows.any():
-            found.noise[action] = effect.var(axis=0) + LEAST_NOISE**2
-            found.process[action] = 0.0
-            continue
-        part, rest = features[rows], effect - effect.mean(axis=0)
+        counts = weight[rows]
+        mean = (counts @ effect[rows] + PRIOR_TRIALS * usual) / (counts.sum() + PRIOR_TRIALS)
+        found.mean[action] = mean
+        part = features[rows] * np.sqrt(counts)[:, None]
+        rest = (effect[rows] - mean) * np.sqrt(counts)[:, None]
         roots, axes = np.linalg.eigh(part.T @ part)
         roots = np.maximum(roots, 0.0)
         for axis in range(2):
-            value, ratio, process = _best_ratio(roots, axes.T @ (part.T @ rest[:, axis]), rest[:, axis])
+            projected = axes.T @ (part.T @ rest[:, axis])
+            square = float(rest[:, axis] @ rest[:, axis])
+            value, ratio, process = _best_ratio(roots, projected, square, counts.sum(), spread[axis])
             evidence += value
             turned = axes / (roots + ratio)
-            found.weights[action, axis] = turned @ (axes.T @ (part.T @ rest[:, axis]))
+            found.weights[action, axis] = turned @ projected
             found.process[action, axis] = process
-            found.noise[action, axis] = ratio * process
+            # Where the mean itself is known from few trials only, what comes is less certain.
+            found.noise[action, axis] = ratio * process * (1 + 1 / (counts.sum() + PRIOR_TRIALS))
             found.covariance[action, axis] = ratio * process * (turned @ axes.T)
     return evidence, found
 
 
-def _best_ratio(roots: Floats, projected: Floats, rest: Floats) -> tuple[float, float, float]:
+def _best_ratio(
+    roots: Floats, projected: Floats, square: float, n: float, spread: float
+) -> tuple[float, float, float]:
     """The log evidence of the best of `RATIOS`, that ratio, and the variance of the process with it.
 
     `roots` (c,) are eigenvalues of the features' scatter, `projected` (c,) the features' products with the
-    displacements `rest` (n,) along its axes.
+    displacements of `n` trials along its axes, `square` the sum of the displacements' squares, m2. The prior
+    of process and noise together is an inverse gamma distribution of `PRIOR_TRIALS` trials around `spread`.
     """
     best = (-np.inf, 1.0, 1.0)
-    n = len(rest)
     for ratio in RATIOS:
-        # Of N(0, process * (features features' + ratio I)), by the matrix inversion and determinant lemmas.
-        fit = float(rest @ rest) - float((projected**2 / (roots + ratio)).sum())
-        process = max(fit / ratio / n, LEAST_NOISE**2 / ratio)
+        # Of N(0, process * (features features' + ratio I)), by the matrix inversion and determinant lemmas;
+        # the amplitude is integrated out.
+        fit = (square - float((projected**2 / (roots + ratio)).sum())) / ratio
+        prior = PRIOR_TRIALS * spread / (1 + ratio)
+        process = max((prior + fit) / (PRIOR_TRIALS + n), LEAST_NOISE**2 / ratio)
         determinant = float(np.log1p(roots / ratio).sum()) + n * np.log(ratio)
-        value = -0.5 * (fit / ratio / process + determinant + n * np.log(process))
+        value = 0.5 * (PRIOR_TRIALS * np.log(prior) - (PRIOR_TRIALS + n) * np.log(prior + fit) - determinant)
+        value -= 0.5 * (np.log(ratio) / RATIO_WIDTH) ** 2
         if value > best[0]:
             best = (value, ratio, process)
     return best

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import os
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -70,15 +71,15 @@ class Affordances:
             "model": self.name,
             "names_m": list(self.names_m),
             "names_o": list(self.names_o),
-            "things_m": {n: v.tolist() for n, v in self.things_m.items()},
-            "things_o": {n: v.tolist() for n, v in self.things_o.items()},
+            "things_m": {n: _plain(v) for n, v in self.things_m.items()},
+            "things_o": {n: _plain(v) for n, v in self.things_o.items()},
             "trials": self.trials,
             "source": self.source,
             "parameters": self.model.to_json(),
         }
         text = (json.dumps(data) + "\n").encode()
         # Without a time in it the same is packed to the same.
-        Path(path).write_bytes(gzip.compress(text, mtime=0) if str(path).endswith(".gz") else text)
+        _write(Path(path), gzip.compress(text, mtime=0) if str(path).endswith(".gz") else text)
 
     @classmethod
     def load(cls, path: Path | str) -> Affordances:
@@ -91,8 +92,8 @@ class Affordances:
                 model_class(data["model"]).from_json(data["parameters"]),
                 tuple(data["names_m"]),
                 tuple(data["names_o"]),
-                {n: np.array(v) for n, v in data["things_m"].items()},
-                {n: np.array(v) for n, v in data["things_o"].items()},
+                {n: np.array(v, np.float64) for n, v in data["things_m"].items()},
+                {n: np.array(v, np.float64) for n, v in data["things_o"].items()},
                 int(data["trials"]),
                 str(data["source"]),
             )
@@ -101,6 +102,19 @@ class Affordances:
                 f"'{one_line(path.name)}' is incomplete, or of another version ({one_line(error)}); "
                 "learn it again: cogarch learn networks"
             ) from None
+
+
+def _write(path: Path, content: bytes) -> None:
+    """Whole or not at all: the file may be in use, and the process may be killed at any moment."""
+    if path.exists() and not path.is_file():  # a device or a pipe
+        path.write_bytes(content)
+        return
+    draft = path.with_name(f"{path.name}.{os.getpid()}.part")
+    try:
+        draft.write_bytes(content)
+        draft.replace(path)
+    finally:
+        draft.unlink(missing_ok=True)
 
 
 def _kept(path: Path) -> dict[str, Any]:
@@ -130,6 +144,11 @@ def check_place(path: Path) -> None:
         raise AffordanceError(
             f"'{one_line(path)}' holds something else than a learned model; take another --out"
         ) from None
+
+
+def _plain(shape: Floats) -> list[float | None]:
+    """JSON knows no NaN."""
+    return [None if np.isnan(value) else value for value in shape.tolist()]
 
 
 def _means(names: Names, shapes: Floats) -> dict[str, Floats]:

@@ -20,7 +20,7 @@ from cognitive_arch.errors import ExplorationError, one_line, unknown
 from cognitive_arch.evaluation.rows import RowFile, locked, whole_lines
 from cognitive_arch.evaluation.running import in_processes, is_ctrl_c
 from cognitive_arch.perception.descriptors import DEFAULT, FORMULAS
-from cognitive_arch.runlog.records import versions
+from cognitive_arch.runlog.records import other_versions, versions
 
 if TYPE_CHECKING:
     from sim.exploration import Outcome
@@ -205,16 +205,19 @@ def _claim(config: ExploreConfig, out: Path, command: str) -> None:
         try:
             theirs = json.loads(path.read_text(encoding="utf-8"))
             kept = {key: theirs["config"][key] for key in config.identity()}
-            made_by, format_ = theirs["versions"], theirs["format"]
+            made_by, format_ = dict(theirs["versions"]), theirs["format"]
+            asked = int(theirs["config"]["trials"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ExplorationError(f"{path} cannot be read: {one_line(error)}") from None
         if kept != config.identity():
             told = ", ".join(f"{k} {kept[k]}, now {v}" for k, v in config.identity().items() if kept[k] != v)
             raise ExplorationError(f"{out} holds another exploration ({told}); take another --out")
-        if format_ != FORMAT or made_by != versions():
-            raise ExplorationError(f"{out} was begun with other versions; take another --out")
-        return
-    if out.exists():
+        told = other_versions(made_by) if format_ == FORMAT else f"format {format_}, now {FORMAT}"
+        if told:
+            raise ExplorationError(f"{out} was begun with other versions ({told}); take another --out")
+        if asked >= config.trials:
+            return
+    elif out.exists():
         raise ExplorationError(
             f"{out} is not a file of this exploration (there is no {path.name} beside it); take another --out"
         )

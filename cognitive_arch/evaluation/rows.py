@@ -14,7 +14,7 @@ from typing import IO, Any, NamedTuple, Protocol
 
 from cognitive_arch.errors import SweepError, one_line
 from cognitive_arch.evaluation.sweep import SweepConfig
-from cognitive_arch.runlog.records import versions
+from cognitive_arch.runlog.records import other_versions, versions
 
 ROWS, MANIFEST = "rows.csv", "sweep.json"
 FORMAT = 1
@@ -212,10 +212,8 @@ def _compare(folder: Path, mine: Mapping[str, Any], theirs: Mapping[str, Any]) -
 
 def _check_versions(folder: Path) -> None:
     """What is missing must be added by what made the rest; a finished sweep may be drawn anew by any."""
-    then, now = read_manifest(folder)["versions"], versions()
-    changed = sorted(key for key in {*then, *now} if then.get(key) != now.get(key))
-    if changed:
-        told = ", ".join(f"{key} {then.get(key)}, now {now.get(key)}" for key in changed)
+    told = other_versions(read_manifest(folder)["versions"])
+    if told:
         raise SweepError(f"{folder} was begun with other versions ({told}); take another --out")
 
 

@@ -21,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cognitive_arch.errors import PerceptionError, unknown
-from cognitive_arch.perception.outline import MOMENTS, Mask, Outline, cropped, halves, outline, ratio
+from cognitive_arch.perception.outline import MOMENTS, Mask, Outline, cropped, halves, outline, pixels, ratio
 
 AREA_UNIT = 3000.0  # square pixels; the constant behind the published areas
 PARTS = ("whole", "top", "bottom")
@@ -201,7 +201,7 @@ def describe(mask: Mask, formulas: str = DEFAULT, contour: NDArray[np.int32] | N
         blob = cropped(mask)
         whole = outline(blob)
     else:
-        blob = np.ascontiguousarray(mask).view(np.uint8)
+        blob = pixels(mask)
         whole = Outline(contour[:, None])
     top, bottom = halves(blob, whole)
     if table.simplified:

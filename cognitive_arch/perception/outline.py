@@ -92,16 +92,21 @@ def ratio(part: float, whole: float) -> float:
     return part / whole if whole > 0 else 0.0
 
 
+def pixels(mask: Mask) -> NDArray[np.uint8]:
+    """`mask` (h, w) as uint8; raises `PerceptionError` for what is no mask."""
+    if mask.ndim != 2 or mask.dtype not in (np.bool_, np.uint8):
+        raise PerceptionError(
+            f"a mask of shape {mask.shape} and type {mask.dtype}; valid: (h, w) of uint8 or bool"
+        )
+    return np.ascontiguousarray(mask).view(np.uint8)
+
+
 def cropped(mask: Mask) -> NDArray[np.uint8]:
     """The rectangle of `mask` (h, w) that holds all of its pixels that are not 0, as uint8.
 
     Raises `PerceptionError` for what is no mask, or an empty one.
     """
-    if mask.ndim != 2 or mask.dtype not in (np.bool_, np.uint8):
-        raise PerceptionError(
-            f"a mask of shape {mask.shape} and type {mask.dtype}; valid: (h, w) of uint8 or bool"
-        )
-    filled = np.ascontiguousarray(mask).view(np.uint8)
+    filled = pixels(mask)
     x, y, width, height = cv2.boundingRect(filled) if filled.size else (0, 0, 0, 0)
     if not width:
         raise PerceptionError("a mask without a pixel that is not 0; valid: one blob")

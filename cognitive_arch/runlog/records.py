@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import platform
 import subprocess
+from collections.abc import Mapping
 from importlib import metadata
 from pathlib import Path
 from typing import Any
@@ -88,6 +89,13 @@ def versions() -> dict[str, str]:
             found[name] = "not installed"
     found["git"] = _git_commit()
     return found
+
+
+def other_versions(then: Mapping[str, str]) -> str:
+    """What is different from `versions` now, in words; empty if nothing is."""
+    now = versions()
+    changed = sorted(key for key in {*then, *now} if then.get(key) != now.get(key))
+    return ", ".join(f"{key} {then.get(key)}, now {now.get(key)}" for key in changed)
 
 
 def _git_commit() -> str:

@@ -9,6 +9,7 @@ import pytest
 from cognitive_arch.affordances.evaluation import PROTOCOLS, evaluate, splits, without_start
 from cognitive_arch.affordances.features import described_by, soft_bins
 from cognitive_arch.affordances.metrics import match_distance, reliability, scores, winners
+from cognitive_arch.affordances.mixture import MixtureModel
 from cognitive_arch.affordances.model import coupled, marginals_of
 from cognitive_arch.affordances.published import read_published
 from cognitive_arch.affordances.registry import BASELINES, MODELS, Affordances
@@ -94,6 +95,51 @@ def test_networks_learn_where_descriptors_are_missing(trials: TrialTable) -> Non
     assert scores(model.joint(test), test.bins).accuracy > 0.55
     with pytest.raises(AffordanceError, match="every descriptor"):
         MODELS["pca"].fit(replace(trials, shape_m=holes), RNG(0))
+
+
+def test_a_descriptor_of_which_nothing_is_known_leaves_numbers(trials: TrialTable, tmp_path: Path) -> None:
+    holes = trials.shape_o.copy()
+    holes[:, 0] = np.nan
+    table = replace(trials, shape_o=holes)
+    Affordances.learn(table, "default", RNG(0)).save(tmp_path / "model.json")
+    assert "NaN" not in (tmp_path / "model.json").read_text()
+    joint = Affordances.load(tmp_path / "model.json").model.joint(table)
+    np.testing.assert_allclose(joint.sum(axis=(1, 2)), 1.0, atol=1e-6)
+
+
+def test_places_known_of_some_trials_only_are_not_looked_at_by_any_part(trials: TrialTable) -> None:
+    start = trials.start.copy()
+    start[:3] = np.nan
+    model = MixtureModel.fit(replace(trials, start=start), RNG(0))
+    assert not model.process.with_start
+    assert not model.forest.with_start
+
+
+def test_a_model_that_goes_on_learning_knows_the_new_places(trials: TrialTable) -> None:
+    model = MixtureModel.fit(trials.take(np.arange(40)), RNG(0))
+    further = trials.take(np.arange(40, 80))
+    model.update(replace(further, start=further.start + 1.0), RNG(0))
+    assert (model.places > trials.start.max()).any()
+
+
+def test_a_model_is_kept_whole_or_not_at_all(
+    learned: dict[str, Affordances], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A disk that is full leaves the model that was there."""
+    path = tmp_path / "model.json"
+    learned["majority"].save(path)
+    before = path.read_bytes()
+
+    def full(self: Path, content: bytes) -> int:
+        with self.open("wb") as stream:
+            stream.write(content[:10])
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(Path, "write_bytes", full)
+    with pytest.raises(OSError, match="No space"):
+        learned["default"].save(path)
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
 
 
 def test_what_was_never_seen_is_a_random_prediction(trials: TrialTable) -> None:

@@ -79,3 +79,47 @@ def test_noise_is_told_from_what_shapes_do() -> None:
     )
     assert quiet == pytest.approx(0.005, rel=0.4)
     assert loud == pytest.approx(0.03, rel=0.3)
+
+
+def test_one_thing_that_rolled_away_does_not_hide_the_rest(learned: ProcessCPD) -> None:
+    table = sized(SIZES)
+    effect, start = table.effect.copy(), table.start.copy()
+    effect[np.flatnonzero(table.action == PULL)[0]] = (3.0, -2.0)
+    start[np.flatnonzero(table.action == PULL)[1]] = (-9.0, 8.0)
+    found = ProcessCPD.fit(replace(table, effect=effect, start=start), np.random.default_rng(0))
+    test = sized(SIZES, seed=3)
+    pulls = test.action == PULL
+    right, before = (
+        (cpd.marginals(test)[pulls, 0].argmax(axis=1) == test.bins[pulls, 0]).mean()
+        for cpd in (found, learned)
+    )
+    assert right > before - 0.05
+
+
+def test_views_of_a_trial_count_as_one(learned: ProcessCPD) -> None:
+    table = sized(SIZES)
+    seen_often = ProcessCPD.fit(table.take(np.repeat(np.arange(len(table)), 20)), np.random.default_rng(0))
+    test = sized(np.linspace(0.005, 0.04, 50), seed=4)
+    np.testing.assert_allclose(seen_often.marginals(test), learned.marginals(test), atol=0.02)
+
+
+@pytest.mark.parametrize(("count", "most"), [(1, 0.6), (2, 0.85), (3, 0.98)])
+def test_an_action_tried_once_or_twice_is_not_certain(count: int, most: float) -> None:
+    """What was seen is likelier than before, but two trials that agree do not exclude the rest."""
+    table = sized(SIZES)
+    pulls = np.flatnonzero((table.action == PULL) & (table.bins[:, 0] == 4))[:count]
+    few = table.take(np.concatenate([np.flatnonzero(table.action != PULL), pulls]))
+    none = table.take(table.action != PULL)
+    asked = table.take(pulls[:1])
+    after, before = (
+        ProcessCPD.fit(part, np.random.default_rng(0)).marginals(asked)[0, 0, 4] for part in (few, none)
+    )
+    assert before < after < most
+
+
+def test_the_place_is_looked_at_as_told(learned: ProcessCPD) -> None:
+    table = sized(SIZES)
+    assert learned.with_start
+    found = ProcessCPD.fit(table, np.random.default_rng(0), with_start=False)
+    elsewhere = replace(table, start=table.start + 0.1)
+    assert np.array_equal(found.marginals(table), found.marginals(elsewhere))
