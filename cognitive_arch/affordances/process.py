@@ -29,7 +29,7 @@ LENGTHS = (0.7, 1.4, 2.8)
 RATIOS = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0, 10.0)
 """Of the variance of noise by that of the process, to choose from."""
 RATIO_WIDTH = 1.5
-"""Prior standard deviation of a ratio's logarithm: a few trials cannot show that there is hardly any noise."""
+"""Prior standard deviation of a ratio's logarithm: few trials cannot show that there is hardly any noise."""
 CENTRES = 100
 LIMIT = 3.0  # standard deviations; inputs are cut off there
 LEAST_NOISE = 0.004
