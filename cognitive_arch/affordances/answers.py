@@ -18,7 +18,7 @@ from cognitive_arch.affordances.networks import NetworkModel
 from cognitive_arch.affordances.published import READERS, read_published
 from cognitive_arch.affordances.queries import Oracle, Place, Thing, goal_mask, matrix_text
 from cognitive_arch.affordances.registry import BASELINES, MODELS, Affordances, check_place
-from cognitive_arch.affordances.sight import HALVES, is_picture, seen_thing
+from cognitive_arch.affordances.sight import HALVES, check_formulas, is_picture, seen_thing
 from cognitive_arch.affordances.trials import ACTIONS, BINS, Floats, TrialTable, read_trials
 from cognitive_arch.errors import AffordanceError, one_line, unknown
 
@@ -225,6 +225,12 @@ def ask(learned: Affordances, question: Question, picture: Path | None = None) -
     oracle = Oracle(learned)
     if question.half not in HALVES:
         raise AffordanceError(unknown("half", question.half, HALVES))
+    check_formulas(question.formulas)
+    if question.tools and (question.goal is None or question.action is None or question.manipulator):
+        raise AffordanceError(
+            "tools to choose from are for a question such as --action pull --goal closer --tools Stick,Rake "
+            "(without --manipulator)"
+        )
     m = _manipulator(oracle, question, question.manipulator) if question.manipulator else None
     o = _object(oracle, question, question.object) if question.object else None
     if question.action is not None and question.action not in (*ACTIONS, "draw"):
@@ -237,6 +243,7 @@ def ask(learned: Affordances, question: Question, picture: Path | None = None) -
             "start": list(question.start) if question.start else None,
             "goal": question.goal,
         },
+        "start_counts": bool(question.start and learned.model.counts(np.array([question.start]))[0]),
         "model": learned.name,
         "trials": learned.trials,
     }
@@ -301,6 +308,8 @@ def ask_text(answer: Mapping[str, Any]) -> str:
     asked = answer["asked"]
     given = ", ".join(f"{k} {v}" for k, v in asked.items() if v is not None) or "nothing given"
     lines = [f"{answer['model']}, {answer['trials']} trials; {given}"]
+    if asked["start"] and not answer["start_counts"]:
+        lines.append("start        not looked at: far from where things were tried, or not in the model")
     if answer["kind"] == "effects":
         lines.append(matrix_text(np.array(answer["effects"])))
     else:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cognitive_arch.affordances.features import polar
 from cognitive_arch.affordances.mixture import ActionCPD
@@ -35,6 +36,10 @@ class MajorityModel:
     def joint(self, table: TrialTable) -> Floats:
         """See `EffectModel`."""
         return independent(self.action.marginals(table))
+
+    def counts(self, start: Floats) -> NDArray[np.bool_]:
+        """See `EffectModel`."""
+        return np.zeros(len(start), np.bool_)
 
     def update(self, table: TrialTable, rng: np.random.Generator) -> None:
         """See `EffectModel`."""
@@ -94,6 +99,10 @@ class SklearnModel:
         for axis, classifier in enumerate(self.classifiers):
             marginals[:, axis, classifier.classes_] += classifier.predict_proba(inputs)
         return independent(marginals / marginals.sum(axis=2, keepdims=True))
+
+    def counts(self, start: Floats) -> NDArray[np.bool_]:
+        """See `EffectModel`."""
+        return np.full(len(start), self.with_start)
 
     def update(self, table: TrialTable, rng: np.random.Generator) -> None:
         """See `EffectModel`."""

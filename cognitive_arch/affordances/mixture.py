@@ -18,6 +18,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from cognitive_arch.affordances.forest import TREES, ForestCPD
@@ -93,8 +94,7 @@ class MixtureModel:
 
     def joint(self, table: TrialTable) -> Floats:
         """See `EffectModel`."""
-        # A place farther out than those tried tells as little as one that is not told.
-        unknown = np.asarray(~self.softmax.within(table.start))
+        unknown = ~self.counts(table.start)
         if not (len(self.places) and unknown.any()):
             return self._joint(table)
         answer = np.zeros((len(table), N_BINS, N_BINS))
@@ -106,6 +106,10 @@ class MixtureModel:
         spread = replace(spread, start=np.tile(self.places, (len(part), 1)))
         answer[unknown] = self._joint(spread).reshape(len(part), -1, N_BINS, N_BINS).mean(axis=1)
         return answer
+
+    def counts(self, start: Floats) -> NDArray[np.bool_]:
+        """See `EffectModel`: a place farther out than those tried tells as little as one that is not told."""
+        return self.softmax.within(start)
 
     def _joint(self, table: TrialTable) -> Floats:
         each = _marginals((self.action, self.softmax, self.forest, self.process), table)

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import Any, Protocol, Self
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cognitive_arch.affordances.trials import ACTIONS, N_BINS, Floats, TrialTable
 
@@ -25,6 +26,9 @@ class EffectModel(Protocol):
 
     def joint(self, table: TrialTable) -> Floats:
         """The distribution of each trial's effects, (n, 5, 5): x (longitudinal) first, then y."""
+
+    def counts(self, start: Floats) -> NDArray[np.bool_]:
+        """Whether it makes a difference that things stand at these places (n, 2), (n,)."""
 
     def update(self, table: TrialTable, rng: np.random.Generator) -> None:
         """Learn from further trials, be it a single one."""

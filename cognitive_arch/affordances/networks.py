@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from cognitive_arch.affordances import search
 from cognitive_arch.affordances.compiled import CompiledEffects
@@ -126,6 +127,10 @@ class NetworkModel:
         """See `EffectModel`."""
         states = self.evidence(table)
         return np.einsum("k,knij->nij", self.weights, [c.many(states) for c in self.compiled])
+
+    def counts(self, start: Floats) -> NDArray[np.bool_]:
+        """See `EffectModel`: there is no node for the place."""
+        return np.zeros(len(start), np.bool_)
 
     def query(self, states: Ints) -> Floats:
         """(5, 5) for the states of action and features, (1 + features,), by look-up."""

@@ -17,6 +17,14 @@ def is_picture(text: str) -> bool:
     return Path(text.partition("#")[0]).suffix.lower() in SUFFIXES
 
 
+def check_formulas(name: str) -> None:
+    """Raises `AffordanceError` where there is no such set of formulas."""
+    from cognitive_arch.perception.descriptors import FORMULAS
+
+    if name not in FORMULAS:
+        raise AffordanceError(unknown("set of formulas", name, FORMULAS))
+
+
 def seen_thing(text: str, part: str, names: Sequence[str], formulas: str) -> Thing:
     """The thing in a picture: `FILE` for its largest blob, `FILE#N` for the N-th from the top, from 1 on.
 
@@ -24,10 +32,9 @@ def seen_thing(text: str, part: str, names: Sequence[str], formulas: str) -> Thi
     descriptors wanted, by the table `formulas` of `perception.descriptors`. Raises `PerceptionError` for
     unusable pictures and `AffordanceError` for blobs and descriptors that are not there.
     """
-    from cognitive_arch.perception import descriptors, images, segmentation, vision
+    from cognitive_arch.perception import images, segmentation, vision
 
-    if formulas not in descriptors.FORMULAS:
-        raise AffordanceError(unknown("set of formulas", formulas, descriptors.FORMULAS))
+    check_formulas(formulas)
     file, _, number = text.partition("#")
     image = images.read_image(Path(file))
     # As `cogarch see` does, so that blobs have the same numbers and shapes.

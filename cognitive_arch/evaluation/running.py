@@ -167,12 +167,14 @@ def _cluster(address: str | None) -> Iterator[Any]:
         return
     try:
         from distributed import Client
+        from distributed.comm import get_address_host_port
     except ImportError:
         raise SweepError(
             "--dask takes the package distributed: pip install 'cognitive-arch[cluster]'"
         ) from None
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
+        get_address_host_port(address)  # a client that was half made complains once more when it goes
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise SweepError(

@@ -166,6 +166,17 @@ def test_without_a_model_what_comes_along_is_asked(cogarch: Any) -> None:
     assert found.json["choice"] == "Hook-left"
 
 
+def test_it_is_told_when_the_place_makes_no_difference(cogarch: Any, files: Path) -> None:
+    asked = ("query", "--action", "pull", "--manipulator", "Rake")
+    near, far, none = (
+        cogarch(*asked, *start, "--json").json for start in (("--start=-0.45,0.1",), ("--start=99,99",), ())
+    )
+    assert [answer["start_counts"] for answer in (near, far, none)] == [True, False, False]
+    assert far["effects"] == none["effects"] != near["effects"]
+    assert "not looked at" in cogarch(*asked, "--start=99,99").out
+    assert "not looked at" not in cogarch(*asked, "--start=-0.45,0.1").out
+
+
 def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tmp_path: Path) -> None:
     import cv2
 
@@ -204,6 +215,8 @@ def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tm
         (["reproduce", "fig46", "--seed", "-4"], "seed -4; valid: 0 or more"),
         (["reproduce", "fig46", "--jobs", "0"], "0 jobs; valid: 1 to 1024"),
         (["query", "TRIALS"], "is no learned model"),
+        (["query", "--formulas", "mine"], "unknown set of formulas 'mine'"),
+        (["query", "--action", "pull", "--tools", "Stick,Rake"], "--goal closer"),
         (["reproduce", "table10"], "never published"),
         (["reproduce", "table9", "--trials", "absent.csv"], "no file of trials"),
         (["reproduce", "fig47", "--trials", "TRIALS"], "both kinds"),

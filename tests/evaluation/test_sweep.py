@@ -230,6 +230,19 @@ def test_a_scheduler_that_does_not_answer(cogarch: Any, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists()
 
 
+@pytest.mark.parametrize("address", ["foo", "foo://127.0.0.1:1", "127.0.0.1:port"])
+def test_an_address_that_is_none_is_not_tried(
+    cogarch: Any, tmp_path: Path, address: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A client that was half made would end in a traceback of its own."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.delattr(distributed.Client, "__init__")
+    answer = cogarch("sweep", "--out", str(tmp_path / "out"), "--dask", address)
+    assert answer.code == 2
+    assert f"no Dask scheduler answers at {address}" in answer.err
+    assert len(answer.err.splitlines()) == 1
+
+
 def test_the_rows_of_another_sweep_are_left_alone(undisturbed: Path, cogarch: Any) -> None:
     before = {path: path.read_bytes() for path in undisturbed.rglob("*") if path.is_file()}
     answer = cogarch("sweep", "--out", str(undisturbed), "--episodes", "3")
