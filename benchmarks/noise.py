@@ -61,6 +61,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int, default=40, help="trials per level")
     parser.add_argument("--jobs", type=int, default=1)
     options = parser.parse_args(arguments)
+    for what in options.what.split(","):
+        if what not in WHAT:
+            parser.error(f"unknown action '{what}'; valid: {', '.join(WHAT)}")
     print(f"{'action':<8}{'level':>6}   failed")
     with ProcessPoolExecutor(options.jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
         for what in options.what.split(","):

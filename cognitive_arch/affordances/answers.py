@@ -28,11 +28,11 @@ Notice = Callable[[str], None]
 def load_table(trials: str, data: Path | None) -> TrialTable:
     """A file of trials, the robot's own exploration by name, or a published table by name when `data` says
     where these lie."""
-    if trials in EXPLORED and not Path(trials).exists():
+    if trials in EXPLORED and not Path(trials).is_file():
         return read_explored(trials)
     if data is not None and not Path(trials).is_file():
         return read_published(data, trials)
-    if trials in READERS and not Path(trials).exists():
+    if trials in READERS and not Path(trials).is_file():
         raise AffordanceError(f"'{trials}' is a published table: say with --data where these lie")
     return read_trials(trials)
 

@@ -79,6 +79,9 @@ class Scaling:
         if robust:
             centre = np.nanmedian(known, axis=0)
             width = 1.4826 * np.nanmedian(np.abs(known - centre), axis=0)
+            # Where more than half of the values are the same, as with a few marked places.
+            most = np.clip(known, *np.nanpercentile(known, (5, 95), axis=0))
+            width = np.where(width > 1e-9, width, np.nanstd(most, axis=0))
         else:
             centre, width = np.nanmean(known, axis=0), np.nanstd(known, axis=0)
         return cls(centre, np.where(width > 1e-9, width, 1.0), limit)

@@ -83,7 +83,7 @@ class MixtureModel:
 
         Of more than `MOST_ROWS` rows (mostly views of the same trials) as many are drawn.
         """
-        table = _drawn(table, rng)
+        table = _drawn(table, rng, MOST_ROWS)
         parts = _fit_parts(table, rng)
         held_out = _held_out(table, rng, parts[1])
         weights = _weights_by_action(held_out, table)
@@ -109,7 +109,7 @@ class MixtureModel:
 
     def counts(self, start: Floats) -> NDArray[np.bool_]:
         """See `EffectModel`: a place farther out than those tried tells as little as one that is not told."""
-        return self.softmax.within(start)
+        return self.softmax.within(start) & (len(self.places) > 0)
 
     def _joint(self, table: TrialTable) -> Floats:
         each = _marginals((self.action, self.softmax, self.forest, self.process), table)
@@ -119,9 +119,12 @@ class MixtureModel:
     def update(self, table: TrialTable, rng: np.random.Generator) -> None:
         """Further trials: the parts are learned again from all trials, the weights stay as they are.
 
-        A model that was loaded from a file has no trials: give it those it was learned from.
+        A model that was loaded from a file has no trials: give it those it was learned from. Of more than
+        `MOST_ROWS` rows earlier ones are left out.
         """
-        self.seen = _drawn(table if self.seen is None else joined([self.seen, table]), rng)
+        if self.seen is not None:
+            table = joined([_drawn(self.seen, rng, max(1, MOST_ROWS - len(table))), table])
+        self.seen = table
         self.action, self.softmax, self.forest, self.process = _fit_parts(self.seen, rng, self.softmax)
         self.places = _places(self.seen, rng)
 
@@ -157,11 +160,11 @@ Parts = tuple[ActionCPD, SoftmaxCPD, ForestCPD, ProcessCPD]
 PARTS = 4
 
 
-def _drawn(table: TrialTable, rng: np.random.Generator) -> TrialTable:
-    """At most `MOST_ROWS` of the rows, in their order."""
-    if len(table) <= MOST_ROWS:
+def _drawn(table: TrialTable, rng: np.random.Generator, most: int) -> TrialTable:
+    """At most so many of the rows, in their order."""
+    if len(table) <= most:
         return table
-    return table.take(np.sort(rng.choice(len(table), MOST_ROWS, replace=False)))
+    return table.take(np.sort(rng.choice(len(table), most, replace=False)))
 
 
 def _places(table: TrialTable, rng: np.random.Generator) -> Floats:

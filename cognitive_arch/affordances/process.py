@@ -40,12 +40,15 @@ FARTHEST = 0.03
 that rolled away does not tell how far others go."""
 PRIOR_TRIALS = 3.0
 """As how many trials the spread of all actions' effects counts in the spread of each, and their mean in its
-mean."""
+mean; and `PRIOR_SPREAD` in the spread of all."""
+PRIOR_SPREAD = 0.04
+"""Metres, standard deviation of effects before anything was tried: about as wide as the bins."""
 
 
 class Regression(NamedTuple):
     """Of each action and axis: `mean` (actions, 2), `weights` (actions, 2, c), their `covariance` (actions,
-    2, c, c), variances of the process and of noise (actions, 2), in metres and square metres."""
+    2, c, c), variances of the process and of noise (actions, 2), in metres and square metres. What few trials
+    leave open of the mean is part of the noise."""
 
     mean: Floats
     weights: Floats
@@ -156,7 +159,7 @@ def _regressed(features: Floats, table: TrialTable) -> tuple[float, Regression]:
     _, trial, views = np.unique(table.trial, return_inverse=True, return_counts=True)
     weight = 1.0 / views[trial]
     usual = np.average(effect, axis=0, weights=weight)
-    spread = np.average((effect - usual) ** 2, axis=0, weights=weight) + LEAST_NOISE**2
+    spread = (PRIOR_TRIALS * PRIOR_SPREAD**2 + weight @ (effect - usual) ** 2) / (PRIOR_TRIALS + weight.sum())
     found = Regression(
         np.tile(usual, (shape[0], 1)),
         np.zeros((*shape, c)),
@@ -180,11 +183,12 @@ def _regressed(features: Floats, table: TrialTable) -> tuple[float, Regression]:
             value, ratio, process = _best_ratio(roots, projected, square, counts.sum(), spread[axis])
             evidence += value
             turned = axes / (roots + ratio)
+            noise = max(ratio * process, LEAST_NOISE**2)
             found.weights[action, axis] = turned @ projected
             found.process[action, axis] = process
             # Where the mean itself is known from few trials only, what comes is less certain.
-            found.noise[action, axis] = ratio * process * (1 + 1 / (counts.sum() + PRIOR_TRIALS))
-            found.covariance[action, axis] = ratio * process * (turned @ axes.T)
+            found.noise[action, axis] = noise * (1 + 1 / (counts.sum() + PRIOR_TRIALS))
+            found.covariance[action, axis] = noise * (turned @ axes.T)
     return evidence, found
 
 
@@ -203,7 +207,7 @@ def _best_ratio(
         # the amplitude is integrated out.
         fit = (square - float((projected**2 / (roots + ratio)).sum())) / ratio
         prior = PRIOR_TRIALS * spread / (1 + ratio)
-        process = max((prior + fit) / (PRIOR_TRIALS + n), LEAST_NOISE**2 / ratio)
+        process = (prior + fit) / (PRIOR_TRIALS + n)
         determinant = float(np.log1p(roots / ratio).sum()) + n * np.log(ratio)
         value = 0.5 * (PRIOR_TRIALS * np.log(prior) - (PRIOR_TRIALS + n) * np.log(prior + fit) - determinant)
         value -= 0.5 * (np.log(ratio) / RATIO_WIDTH) ** 2

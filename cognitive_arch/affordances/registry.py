@@ -5,6 +5,7 @@ from __future__ import annotations
 import gzip
 import json
 import os
+import shutil
 import zlib
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -105,14 +106,20 @@ class Affordances:
 
 
 def _write(path: Path, content: bytes) -> None:
-    """Whole or not at all: the file may be in use, and the process may be killed at any moment."""
-    if path.exists() and not path.is_file():  # a device or a pipe
+    """Whole or not at all: the file may be in use, and the process may be killed at any moment.
+
+    A link stays one; devices and pipes are written to.
+    """
+    target = path.resolve()
+    if path.absolute().parts[1] in ("dev", "proc") or (target.exists() and not target.is_file()):
         path.write_bytes(content)
         return
-    draft = path.with_name(f"{path.name}.{os.getpid()}.part")
+    draft = target.with_name(f".{os.getpid()}.part")
     try:
         draft.write_bytes(content)
-        draft.replace(path)
+        if target.exists():
+            shutil.copymode(target, draft)
+        draft.replace(target)
     finally:
         draft.unlink(missing_ok=True)
 

@@ -144,6 +144,7 @@ def explore(
     _claim(config, out, command)
     with locked(out) as file:
         rows = RowFile(file, out, _done(whole_lines(file, out, HEADER), config, out))
+        _note(config, out, command)
         before, total = rows.done, config.trials
         on_rows(before, total)
         work = partial(_trials, config, pictures=pictures)
@@ -206,7 +207,7 @@ def _claim(config: ExploreConfig, out: Path, command: str) -> None:
             theirs = json.loads(path.read_text(encoding="utf-8"))
             kept = {key: theirs["config"][key] for key in config.identity()}
             made_by, format_ = dict(theirs["versions"]), theirs["format"]
-            asked = int(theirs["config"]["trials"])
+            int(theirs["config"]["trials"])
         except (OSError, ValueError, KeyError, TypeError) as error:
             raise ExplorationError(f"{path} cannot be read: {one_line(error)}") from None
         if kept != config.identity():
@@ -215,12 +216,23 @@ def _claim(config: ExploreConfig, out: Path, command: str) -> None:
         told = other_versions(made_by) if format_ == FORMAT else f"format {format_}, now {FORMAT}"
         if told:
             raise ExplorationError(f"{out} was begun with other versions ({told}); take another --out")
-        if asked >= config.trials:
-            return
-    elif out.exists():
+        return
+    if out.exists():
         raise ExplorationError(
             f"{out} is not a file of this exploration (there is no {path.name} beside it); take another --out"
         )
+    _write_manifest(config, out, command)
+
+
+def _note(config: ExploreConfig, out: Path, command: str) -> None:
+    """Say beside the file if more trials are asked for than before."""
+    asked = json.loads(_manifest(out).read_text(encoding="utf-8"))["config"]["trials"]
+    if asked < config.trials:
+        _write_manifest(config, out, command)
+
+
+def _write_manifest(config: ExploreConfig, out: Path, command: str) -> None:
+    path = _manifest(out)
     manifest = {"format": FORMAT, "command": command, "config": asdict(config), "versions": versions()}
     draft = path.with_name(path.name + ".part")
     try:

@@ -175,6 +175,12 @@ def _cluster(address: str | None) -> Iterator[Any]:
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
         get_address_host_port(address)  # a client that was half made complains once more when it goes
+    except ValueError as error:
+        raise SweepError(
+            f"'{one_line(address)}' is no address of a Dask scheduler ({one_line(error)}); valid: an address "
+            "such as tcp://127.0.0.1:8786"
+        ) from None
+    try:
         client = Client(address, timeout=PATIENCE_S, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:
         raise SweepError(

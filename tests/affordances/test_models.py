@@ -2,15 +2,19 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
+from cognitive_arch.affordances import mixture
 from cognitive_arch.affordances.evaluation import PROTOCOLS, evaluate, splits, without_start
 from cognitive_arch.affordances.features import described_by, soft_bins
+from cognitive_arch.affordances.forest import ForestCPD
 from cognitive_arch.affordances.metrics import match_distance, reliability, scores, winners
 from cognitive_arch.affordances.mixture import MixtureModel
 from cognitive_arch.affordances.model import coupled, marginals_of
+from cognitive_arch.affordances.process import ProcessCPD
 from cognitive_arch.affordances.published import read_published
 from cognitive_arch.affordances.registry import BASELINES, MODELS, Affordances
 from cognitive_arch.affordances.trials import TrialTable, action_index
@@ -107,12 +111,45 @@ def test_a_descriptor_of_which_nothing_is_known_leaves_numbers(trials: TrialTabl
     np.testing.assert_allclose(joint.sum(axis=(1, 2)), 1.0, atol=1e-6)
 
 
-def test_places_known_of_some_trials_only_are_not_looked_at_by_any_part(trials: TrialTable) -> None:
+def test_trees_and_process_look_at_places_only_if_all_are_known(
+    trials: TrialTable, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Nor do those that the weights are found with, though one fold knows all of its own."""
     start = trials.start.copy()
-    start[:3] = np.nan
-    model = MixtureModel.fit(replace(trials, start=start), RNG(0))
-    assert not model.process.with_start
-    assert not model.forest.with_start
+    start[0] = np.nan
+    looked = []
+    for part in (ProcessCPD, ForestCPD):
+        monkeypatch.setattr(part, "marginals", _told(part.marginals, looked))
+    MixtureModel.fit(replace(trials, start=start), RNG(0))
+    assert len(looked) >= 8
+    assert not any(looked)
+
+
+def _told(marginals: Any, looked: list[bool]) -> Any:
+    def noted(self: Any, table: TrialTable) -> Any:
+        looked.append(self.with_start)
+        return marginals(self, table)
+
+    return noted
+
+
+def test_without_places_none_counts(trials: TrialTable) -> None:
+    model = MixtureModel.fit(without_start(trials), RNG(0))
+    assert not model.counts(np.array([[-0.45, 0.1], [-1.5, 1.0]])).any()
+    assert MixtureModel.fit(trials, RNG(0)).counts(np.array([[-0.45, 0.1], [-9.0, 9.0]])).tolist() == [
+        True,
+        False,
+    ]
+
+
+def test_the_newest_trials_are_kept_of_many(trials: TrialTable, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(mixture, "MOST_ROWS", 50)
+    model = MixtureModel.fit(trials.take(np.arange(80)), RNG(0))
+    new = trials.take(np.arange(80, 90))
+    model.update(new, RNG(0))
+    assert model.seen is not None
+    assert len(model.seen) == 50
+    assert np.array_equal(model.seen.effect[-10:], new.effect)
 
 
 def test_a_model_that_goes_on_learning_knows_the_new_places(trials: TrialTable) -> None:
@@ -140,6 +177,21 @@ def test_a_model_is_kept_whole_or_not_at_all(
         learned["default"].save(path)
     assert path.read_bytes() == before
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_a_model_is_kept_where_a_link_leads_and_in_devices(
+    learned: dict[str, Affordances], tmp_path: Path
+) -> None:
+    real, link = tmp_path / "real.json", tmp_path / "link.json"
+    real.write_text("")
+    real.chmod(0o600)
+    link.symlink_to(real)
+    learned["majority"].save(link)
+    assert link.is_symlink()
+    assert Affordances.load(real).trials == 400
+    assert real.stat().st_mode & 0o777 == 0o600
+    learned["majority"].save("/dev/null")
+    assert not Path("/dev/null").is_file()
 
 
 def test_what_was_never_seen_is_a_random_prediction(trials: TrialTable) -> None:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from cognitive_arch.affordances import process
 from cognitive_arch.affordances.process import ProcessCPD
 from cognitive_arch.affordances.trials import ACTIONS, TrialTable, from_frame
 
@@ -123,3 +124,70 @@ def test_the_place_is_looked_at_as_told(learned: ProcessCPD) -> None:
     found = ProcessCPD.fit(table, np.random.default_rng(0), with_start=False)
     elsewhere = replace(table, start=table.start + 0.1)
     assert np.array_equal(found.marginals(table), found.marginals(elsewhere))
+
+
+def test_evidence_is_that_of_a_multivariate_t() -> None:
+    """Amplitude integrated out under its prior, against the density as scipy has it."""
+    from scipy.stats import multivariate_t
+
+    rng = np.random.default_rng(5)
+    features, rest, spread = rng.normal(size=(7, 3)), rng.normal(0, 0.03, 7), 0.02**2
+    roots, axes = np.linalg.eigh(features.T @ features)
+    found = process._best_ratio(roots, axes.T @ (features.T @ rest), float(rest @ rest), 7, spread)
+    values = {}
+    for ratio in process.RATIOS:
+        scale = spread / (1 + ratio) * (features @ features.T + ratio * np.eye(7))
+        prior = -0.5 * (np.log(ratio) / process.RATIO_WIDTH) ** 2
+        values[ratio] = multivariate_t.logpdf(rest, np.zeros(7), scale, df=process.PRIOR_TRIALS) + prior
+    assert found[1] == max(values, key=lambda ratio: values[ratio])
+
+
+@pytest.mark.parametrize("spread", [0.01, 0.05])
+def test_amplitudes_of_few_trials_are_drawn_towards_those_of_all(spread: float) -> None:
+    one = process._best_ratio(np.zeros(1), np.zeros(1), 0.03**2, 1.0, spread**2)
+    many = process._best_ratio(np.zeros(1), np.zeros(1), 1000 * 0.03**2, 1000.0, spread**2)
+    total_of_one, total_of_many = (ratio * amplitude for _, ratio, amplitude in (one, many))
+    assert total_of_many == pytest.approx(0.03**2, rel=0.02)
+    assert abs(total_of_one - spread**2) < abs(0.03**2 - spread**2)
+
+
+def test_what_always_happened_the_same_is_not_certain_to_the_millimetre() -> None:
+    table = sized(SIZES, noise=0.0)
+    found = ProcessCPD.fit(table, np.random.default_rng(0)).found
+    assert (found.noise[PULL] > process.LEAST_NOISE**2).all()  # and what is open of the mean
+    pushes = ProcessCPD.fit(table, np.random.default_rng(0)).marginals(
+        replace(table, shape_m=table.shape_m + 1)
+    )
+    assert pushes[:, 1, 2].min() > 0.9
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_two_trials_in_all_do_not_tell_what_comes(count: int) -> None:
+    table = sized(SIZES)
+    few = table.take(np.flatnonzero((table.action == PULL) & (table.bins[:, 0] == 4))[:count])
+    learned = ProcessCPD.fit(few, np.random.default_rng(0))
+    pushed = learned.marginals(replace(few, action=np.full(count, ACTIONS.index("push"))))
+    assert pushed[:, 0, 4].max() < 0.95
+    assert learned.marginals(few)[:, 0, 4].max() < 0.97
+
+
+@pytest.mark.parametrize("share", [0.5, 0.6, 0.8])
+def test_a_few_marked_places_are_told_apart(share: float) -> None:
+    rng = np.random.default_rng(0)
+    table = sized(SIZES)
+    near = rng.random(len(table)) < share
+    start = np.where(near[:, None], [-0.3, 0.0], [-0.5, 0.1])
+    effect = np.where(near[:, None], [0.05, 0.0], [-0.05, 0.0]) + rng.normal(0, 0.003, (len(table), 2))
+    table = replace(table, start=start, effect=effect)
+    found = ProcessCPD.fit(table, rng).marginals(table)
+    assert (found[:, 0].argmax(axis=1) == table.bins[:, 0]).mean() > 0.95
+
+
+def test_places_out_of_sight_do_not_hide_where_the_rest_stood() -> None:
+    table = sized(SIZES)
+    start = table.start.copy()
+    start[:3] = [[-9.0, 8.0], [30.0, 2.0], [5.0, -40.0]]
+    effect = np.column_stack([0.3 * start[:, 1].clip(-0.2, 0.2), np.zeros(len(table))])
+    table = replace(table, start=start, effect=effect)
+    found = ProcessCPD.fit(table, np.random.default_rng(0)).marginals(table)
+    assert (found[3:, 0].argmax(axis=1) == table.bins[3:, 0]).mean() > 0.9

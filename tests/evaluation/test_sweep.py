@@ -239,7 +239,7 @@ def test_an_address_that_is_none_is_not_tried(
     monkeypatch.delattr(distributed.Client, "__init__")
     answer = cogarch("sweep", "--out", str(tmp_path / "out"), "--dask", address)
     assert answer.code == 2
-    assert f"no Dask scheduler answers at {address}" in answer.err
+    assert f"'{address}' is no address of a Dask scheduler" in answer.err
     assert len(answer.err.splitlines()) == 1
 
 
