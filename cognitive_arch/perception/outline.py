@@ -57,10 +57,8 @@ class Outline:
 
     def __init__(self, contour: Points, up: tuple[float, float] = (0.0, -1.0)) -> None:
         self.contour = contour
-        corners = cv2.convexHull(contour, returnPoints=False).reshape(-1, 1)
-        self.hull = np.empty((len(corners), 2), np.float32)
         numbers = np.empty(kernels.FIRST_MOMENT + len(kernels.MOMENTS))
-        kernels.measure(contour[:, 0], corners, *up, DEEP, self.hull, numbers)
+        self.hull = kernels.measure(contour[:, 0], *up, DEEP, numbers)
         measured = numbers.tolist()
         self.area: float = measured[kernels.AREA]
         self.perimeter: float = measured[kernels.PERIMETER]

@@ -22,15 +22,17 @@ _part = numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True)
 
 
 @_kernel
-def measure(points, corners, up_x, up_y, deep, hull, numbers):  # type: ignore[no-untyped-def]
-    """Fill `numbers` (10 + 7,) float64 with what is measured along an outline, whose convex hull has the
-    points with the indices `corners` (k, 1) int32, in its order, and `hull` (k, 2) float32 with those points.
+def measure(points, up_x, up_y, deep, numbers):  # type: ignore[no-untyped-def]
+    """The corners of the convex hull of an outline, (k, 2) float32; fill `numbers` (10 + 7,) float64 with what
+    is measured along it.
 
     Moments are those of the outline turned so that the unit vector (`up_x`, `up_y`) points up. Bays are
     counted that reach deeper than `deep` pixels below the hull.
     """
+    corners = _corners(points)
+    hull = np.empty((len(corners), 2), np.float32)
     for k in range(len(corners)):
-        hull[k, 0], hull[k, 1] = points[corners[k, 0], 0], points[corners[k, 0], 1]
+        hull[k, 0], hull[k, 1] = points[corners[k], 0], points[corners[k], 1]
     _moments(points, up_x, up_y, numbers)
     _rectangle(hull, numbers)
     numbers[BAYS] = _bays(points, corners, deep)
@@ -39,6 +41,7 @@ def measure(points, corners, up_x, up_y, deep, hull, numbers):  # type: ignore[n
         numbers[ELLIPSE] = _ellipse(points)
     if numbers[ELLIPSE] == 0 and numbers[LONG] > 0:
         numbers[ELLIPSE] = numbers[SHORT] / numbers[LONG]
+    return hull
 
 
 @_kernel
@@ -51,6 +54,49 @@ def cut(blob, up_x, up_y, middle, above, below):  # type: ignore[no-untyped-def]
             place = start + up_x * x
             above[y, x] = blob[y, x] if place >= -ON_THE_CUT else 0
             below[y, x] = blob[y, x] if place <= ON_THE_CUT else 0
+
+
+@_part
+def _corners(points):  # type: ignore[no-untyped-def]
+    """The indices of the corners of the convex hull, down its left side and up its right one.
+
+    Corners are among the first and the last pixels of the rows, which are in order as they are: nothing is
+    sorted, and it takes a fifth of the time of a hull of any points.
+    """
+    top, bottom = points[0, 1], points[0, 1]
+    for n in range(len(points)):
+        top, bottom = min(top, points[n, 1]), max(bottom, points[n, 1])
+    rows = bottom - top + 1
+    ends = np.full((2, rows), -1, np.int64)  # rows without a point occur in simplified outlines
+    for n in range(len(points)):
+        x, row = points[n, 0], points[n, 1] - top
+        if ends[0, row] < 0 or x < points[ends[0, row], 0]:
+            ends[0, row] = n
+        if ends[1, row] < 0 or x >= points[ends[1, row], 0]:
+            ends[1, row] = n
+    corners = np.empty(2 * rows, np.int64)
+    count = 0
+    for side in range(2):
+        first = count
+        for step in range(rows):
+            n = ends[side, step if side == 0 else rows - 1 - step]
+            if n < 0:
+                continue
+            x, y = points[n, 0], points[n, 1]
+            while count - first >= 2:
+                one, other = corners[count - 2], corners[count - 1]
+                dx, dy = points[other, 0] - points[one, 0], points[other, 1] - points[one, 1]
+                if dx * (y - points[one, 1]) - dy * (x - points[one, 0]) < 0:
+                    break
+                count -= 1
+            corners[count] = n
+            count += 1
+        if side == 0 and points[corners[count - 1], 0] == points[ends[1, rows - 1], 0]:
+            count -= 1  # the lowest pixel begins the way up
+    if count > 1 and points[corners[count - 1], 0] == points[corners[0], 0]:
+        if points[corners[count - 1], 1] == points[corners[0], 1]:
+            count -= 1
+    return corners[:count]
 
 
 @_part
@@ -133,10 +179,10 @@ def _bays(points, corners, deep):  # type: ignore[no-untyped-def]
     ordered = np.empty(len(corners), np.int64)
     for k in range(len(corners)):  # the hull's order may be another where the outline runs back along itself
         place = k
-        while place > 0 and ordered[place - 1] > corners[k, 0]:
+        while place > 0 and ordered[place - 1] > corners[k]:
             ordered[place] = ordered[place - 1]
             place -= 1
-        ordered[place] = corners[k, 0]
+        ordered[place] = corners[k]
     for k in range(len(ordered) if len(ordered) > 2 else 0):
         start, end = ordered[k - 1], ordered[k]
         x, y = points[start, 0], points[start, 1]
@@ -163,12 +209,13 @@ def _ellipse(points):  # type: ignore[no-untyped-def]
     x0, y0 = x0 / len(points), y0 / len(points)
     for n in range(len(points)):
         size = max(size, abs(points[n, 0] - x0), abs(points[n, 1] - y0))
+    unit = 1.0 / size if size > 0 else 0.0
     found, square = np.empty(5), np.empty((5, 6))
     for terms in (5, 3):
         # Sums over the points of x^4, x^3 y, ..., y^4, x^3, ..., y; each stands in several places.
         s40 = s31 = s22 = s13 = s04 = s30 = s21 = s12 = s03 = s20 = s11 = s02 = s10 = s01 = 0.0
         for n in range(len(points)):
-            x, y = (points[n, 0] - x0) / size, (points[n, 1] - y0) / size
+            x, y = (points[n, 0] - x0) * unit, (points[n, 1] - y0) * unit
             xx, xy, yy = x * x, x * y, y * y
             s40, s31, s22 = s40 + xx * xx, s31 + xx * xy, s22 + xx * yy
             s13, s04 = s13 + yy * xy, s04 + yy * yy

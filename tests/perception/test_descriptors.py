@@ -271,6 +271,21 @@ def test_outlines_have_the_measures_that_opencv_gives_them(
     )
 
 
+@settings(max_examples=100, deadline=None)
+@given(
+    st.integers(1, 12).flatmap(
+        lambda w: st.lists(st.lists(st.booleans(), min_size=w, max_size=w), min_size=1, max_size=12)
+    )
+)
+def test_hulls_of_any_outline_have_the_corners_that_opencv_finds(rows: list[list[bool]]) -> None:
+    mask = np.array(rows, np.uint8)
+    for contour in cv2.findContours(mask, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)[0]:
+        ours = Outline(np.asarray(contour, np.int32)).hull
+        theirs = cv2.convexHull(contour).reshape(-1, 2)
+        assert len(ours) == len(theirs)
+        assert {tuple(corner) for corner in ours} == {tuple(corner) for corner in theirs}
+
+
 # -- blobs with little to describe --------------------------------------------------------------------------
 
 
