@@ -23,8 +23,8 @@ _part = numba.njit(nogil=True, error_model="numpy", no_cpython_wrapper=True)
 
 @_kernel
 def measure(points, up_x, up_y, deep, numbers):  # type: ignore[no-untyped-def]
-    """The corners of the convex hull of an outline, (k, 2) float32; fill `numbers` (10 + 7,) float64 with what
-    is measured along it.
+    """The corners of an outline's convex hull, (k, 2) float32; fill `numbers` (10 + 7,) float64 with what is
+    measured along it.
 
     Moments are those of the outline turned so that the unit vector (`up_x`, `up_y`) points up. Bays are
     counted that reach deeper than `deep` pixels below the hull.
@@ -77,13 +77,13 @@ def _corners(points):  # type: ignore[no-untyped-def]
     corners = np.empty(2 * rows, np.int64)
     count = 0
     for side in range(2):
-        first = count
+        start = count
         for step in range(rows):
             n = ends[side, step if side == 0 else rows - 1 - step]
             if n < 0:
                 continue
             x, y = points[n, 0], points[n, 1]
-            while count - first >= 2:
+            while count - start >= 2:
                 one, other = corners[count - 2], corners[count - 1]
                 dx, dy = points[other, 0] - points[one, 0], points[other, 1] - points[one, 1]
                 if dx * (y - points[one, 1]) - dy * (x - points[one, 0]) < 0:
@@ -93,9 +93,9 @@ def _corners(points):  # type: ignore[no-untyped-def]
             count += 1
         if side == 0 and points[corners[count - 1], 0] == points[ends[1, rows - 1], 0]:
             count -= 1  # the lowest pixel begins the way up
-    if count > 1 and points[corners[count - 1], 0] == points[corners[0], 0]:
-        if points[corners[count - 1], 1] == points[corners[0], 1]:
-            count -= 1
+    first, last = corners[0], corners[count - 1]
+    if count > 1 and points[first, 0] == points[last, 0] and points[first, 1] == points[last, 1]:
+        count -= 1
     return corners[:count]
 
 
