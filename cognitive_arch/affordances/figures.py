@@ -163,9 +163,11 @@ def curve_picture(
     figure = _figure(5.8, 4.0)
     axis = figure.subplots()
     for colour, (name, values) in zip(COLOURS, curves.items(), strict=False):
-        low, high = np.nanpercentile(values, [5, 95], axis=1)
-        axis.plot(counts, np.nanmean(values, axis=1), color=colour, marker="o", label=name)
-        axis.fill_between(counts, low, high, color=colour, alpha=0.15, linewidth=0)
+        known = ~np.isnan(values).all(axis=1)  # nothing is learned from no trials
+        where = np.asarray(counts)[known]
+        low, high = np.nanpercentile(values[known], [5, 95], axis=1)
+        axis.plot(where, np.nanmean(values[known], axis=1), color=colour, marker="o", label=name)
+        axis.fill_between(where, low, high, color=colour, alpha=0.15, linewidth=0)
     for name, value in (levels or {}).items():
         axis.axhline(value, color="#777777", linestyle="--", linewidth=1)
         axis.text(counts[-1], value, name, ha="right", va="bottom", fontsize=8)

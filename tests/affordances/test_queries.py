@@ -257,3 +257,15 @@ def test_published_tables_are_compared(cogarch: Any, published: Path, tmp_path: 
     answer = found.json
     assert [check["holds"] for check in answer["checks"][:3]] == [True, True, True]
     assert answer["worked"]["pull"]["stick"] == 0.0
+
+
+@pytest.mark.parametrize("trials", ["own", "published"])
+def test_who_knows_hands_ranks_tools_for_pulling(
+    cogarch: Any, trials: str, request: pytest.FixtureRequest, tmp_path: Path
+) -> None:
+    given = (
+        ("--trials", "explored") if trials == "own" else ("--data", str(request.getfixturevalue("published")))
+    )
+    found = cogarch("reproduce", "table12", *given, "--out", str(tmp_path), "--json")
+    expected = found.json["pull_expected"]
+    assert expected["rake"] > expected["hook"] > expected["stick"]
