@@ -11,6 +11,7 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -18,6 +19,7 @@ from cognitive_arch.shapes import Box, Compound, Cylinder, Shape, Sphere, ToolSh
 
 Points = NDArray[np.float64]
 Distance = Callable[[Points], NDArray[np.float64]]  # (n, 2) or (n, 3) places, m, to signed distances, m
+Bare = Callable[[Points], NDArray[np.bool_]]  # (n, 3) places, m, to whether one sees that nothing is there
 
 BAND = 0.003  # m below the highest points that still belong to the upper face
 HIGHEST = 97.0  # percentile of heights that counts as the highest
@@ -27,6 +29,10 @@ MOST = 240  # points that are looked at
 LEAST = 12  # points without which nothing can be said
 FLOOR = 0.0008  # m, the best that an estimate is believed to be
 UNSEEN = 0.012  # m of uncertainty of a thing of which nothing is seen
+DOUBTFUL = 0.1  # of a thing nowhere where something is seen, above which other poses are tried
+ROUNDS = 3
+SHIFTS = [np.array([x, y, 0.0]) for x in (-0.02, 0.0, 0.02) for y in (-0.02, 0.0, 0.02) if x or y]  # m
+AMISS = 0.02  # m of residual of a thing that is nowhere where something is seen
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,11 +55,14 @@ class PoseEstimate:
         return X_WO
 
 
-def estimate_pose(shape: Shape, surface: Points, outline: Points) -> PoseEstimate | None:
+def estimate_pose(
+    shape: Shape, surface: Points, outline: Points, bare: Bare | None = None
+) -> PoseEstimate | None:
     """Where a standing thing of `shape` is.
 
     `surface` (n, 3) are places of all its visible points, `outline` (m, 3) of those at its own edges, metres.
-    None where there are too few.
+    `bare` tells of places where one sees what is behind them: a thing that is half in view does not lie so
+    that the other half should be seen. None where there are too few points.
     """
     if len(surface) < LEAST or (len(outline) < LEAST and not _is_ball(shape)):
         return None
@@ -61,7 +70,7 @@ def estimate_pose(shape: Shape, surface: Points, outline: Points) -> PoseEstimat
     top = float(np.median(surface[surface[:, 2] > highest - BAND, 2]))
     if _is_ball(shape):
         return _by_surface(shape, _some(surface), float(surface[:, 2].max()))
-    return _by_outline(shape, surface, _some(outline)[:, :2], top)
+    return _by_outline(shape, surface, _some(outline)[:, :2], top, bare)
 
 
 def _is_ball(shape: Shape) -> bool:
@@ -78,23 +87,46 @@ def _some(points: Points) -> Points:
 # -- by the outline -----------------------------------------------------------------------------------
 
 
-def _by_outline(shape: Shape, surface: Points, edge: Points, top: float) -> PoseEstimate | None:
-    distance = outline_distance(shape)
-    best: tuple[float, NDArray[np.float64]] | None = None
-    for start in _starts(shape, surface[:, :2], edge):
-        found = _fit(distance, edge, start, turns=not shape.is_round)
-        rms = _rms(distance(_local(edge, found)))
-        if best is None or rms < best[0]:
-            best = rms, found
-    if best is None:
-        return None
-    rms, (x, y, yaw) = best
+def _by_outline(
+    shape: Shape, surface: Points, edge: Points, top: float, bare: Bare | None
+) -> PoseEstimate | None:
+    distance, inside = outline_distance(shape), _cells(shape)
+    covered = surface[:, :2]
+
+    def fitted(start: NDArray[np.float64]) -> tuple[float, float, NDArray[np.float64]]:
+        """How far off in all, how much of it is amiss, and where."""
+        pose = _fit(distance, edge, start, turns=not shape.is_round)
+        outside = float(np.mean(distance(_local(covered, pose)) > 2 * OUTLIER))
+        missing = 0.0 if bare is None else float(np.mean(bare(_placed(inside, pose, top))))
+        off = math.hypot(_rms(distance(_local(edge, pose))), AMISS * outside, AMISS * missing)
+        return off, max(outside, missing), pose
+
+    best = min((fitted(start) for start in _starts(shape, covered, edge)), key=_off)
+    if isinstance(shape, ToolShape) and shape.bar > 0 and best[1] > DOUBTFUL:
+        # Where a corner is in view, the smallest rectangle around it lies as bar and shaft do.
+        yaw = math.radians(cv2.minAreaRect(covered.astype(np.float32))[2])
+        starts = [s for turn in (0.0, math.pi / 2) for s in _tool_starts(shape, covered, yaw + turn)]
+        best = min([best, *map(fitted, starts)], key=_off)
+        for _ in range(ROUNDS):
+            if best[1] <= DOUBTFUL:
+                break
+            best = min([best, *(fitted(best[2] + shift) for shift in SHIFTS)], key=_off)
+    rms, _, (x, y, yaw) = best
     position = np.array([x, y, top - shape.height / 2])
-    local = _local(surface[:, :2], best[1])
-    outside = float(np.mean(distance(local) > 2 * OUTLIER))
-    seen = _seen(shape, local)
-    rms = math.hypot(rms, 0.02 * outside)
+    seen = _seen(shape, inside, _local(covered, best[2]))
     return PoseEstimate(position, _wrapped(shape, yaw), FLOOR + rms / 2 + UNSEEN * (1 - seen), rms, seen)
+
+
+def _off(found: tuple[float, float, NDArray[np.float64]]) -> float:
+    return found[0]
+
+
+def _placed(local: Points, pose: NDArray[np.float64], height: float) -> Points:
+    """Places (n, 3) on the upper side of a thing, from those in its own frame (n, 2)."""
+    x, y, yaw = pose
+    c, s = math.cos(yaw), math.sin(yaw)
+    columns = (x + c * local[:, 0] - s * local[:, 1], y + s * local[:, 0] + c * local[:, 1])
+    return np.column_stack([*columns, np.full(len(local), height)])
 
 
 def _local(points: Points, pose: NDArray[np.float64]) -> Points:
@@ -169,14 +201,24 @@ def _wrapped(shape: Shape, yaw: float) -> float:
     return (yaw + turn / 2) % turn - turn / 2
 
 
-def _seen(shape: Shape, local: Points) -> float:
-    """The part of the outline's inside near which some point is seen."""
-    cell = max(0.005, min(shape.extent) / 6)
+def _cell(shape: Shape) -> float:
+    slim = shape.width if isinstance(shape, ToolShape) else min(shape.extent) / 2
+    return max(0.005, slim / 3)
+
+
+def _cells(shape: Shape) -> Points:
+    """The middles (n, 2) of the cells inside of the outline, in the thing's frame, metres."""
+    cell = _cell(shape)
     x, y = (np.arange(-side / 2 + cell / 2, side / 2, cell) for side in shape.extent)
     grid = np.array(np.meshgrid(x, y)).reshape(2, -1).T
-    inside = grid[outline_distance(shape)(grid) < -cell / 4]
+    return np.asarray(grid[outline_distance(shape)(grid) < -cell / 4])
+
+
+def _seen(shape: Shape, inside: Points, local: Points) -> float:
+    """The part of the cells `inside` in which some point is seen."""
     if not len(inside):
         return 1.0
+    cell = _cell(shape)
 
     def cells(places: Points) -> NDArray[np.int64]:
         column, row = np.floor((places + np.array(shape.extent) / 2) / cell).astype(np.int64).T
@@ -249,7 +291,7 @@ def _by_surface(shape: Shape, surface: Points, top: float) -> PoseEstimate | Non
             break
     rms = _rms(error)
     # A camera never sees more than half of a ball.
-    seen = min(1.0, 2 * _seen(shape, surface[:, :2] - place[:2]))
+    seen = min(1.0, 2 * _seen(shape, _cells(shape), surface[:, :2] - place[:2]))
     return PoseEstimate(place, 0.0, FLOOR + rms / 2 + UNSEEN * (1 - seen), rms, seen)
 
 

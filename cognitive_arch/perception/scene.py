@@ -154,6 +154,17 @@ class SceneView:
         outline = self.points[rows[~covered], columns[~covered]].astype(np.float64)
         return Region(mask, self.points[mask].astype(np.float64), outline)
 
+    def bare(self, places: NDArray[np.float64]) -> Mask:
+        """Whether one sees that there is nothing at `places` (n, 3), m, because one sees past them, (n,)."""
+        pixels = np.rint(self.camera.project(places))
+        width, height = self.camera.size
+        inside = (pixels >= 0).all(axis=1) & (pixels[:, 0] < width) & (pixels[:, 1] < height)
+        columns, rows = pixels[inside].astype(np.int64).T
+        expected = ((places[inside] - self.camera.position) @ self.camera.X_WC[:3, :3])[:, 2]
+        found = np.zeros(len(places), np.bool_)
+        found[inside] = ~self.own[rows, columns] & (self.depth[rows, columns] > expected + NEARER)
+        return found
+
     def union(self, one: Region, other: Region) -> Region:
         """Two regions as one."""
         return Region(
@@ -181,10 +192,10 @@ def _sighting(
     likely = dict(classify(view.color, region.mask))
     known = {name: p for name, p in likely.items() if name in shapes and p > POSSIBLE}
     unknown = 1.0 - sum(known.values())
-    hypotheses = _fitted(known, region, shapes)
+    hypotheses = _fitted(view, known, region, shapes)
     # What the recogniser never learned is told by its shape alone, from what it calls unknown.
     if unknown > POSSIBLE:
-        strangers = _fitted(dict.fromkeys(set(shapes) - set(likely), 1.0), region, shapes)
+        strangers = _fitted(view, dict.fromkeys(set(shapes) - set(likely), 1.0), region, shapes)
         share = unknown / max(1.0, sum(fit.probability for fit in strangers.values()))
         for name, fit in sorted(strangers.items()):
             hypotheses[name] = Hypothesis(share * fit.probability, fit.estimate)
@@ -193,12 +204,12 @@ def _sighting(
 
 
 def _fitted(
-    likely: Mapping[str, float], region: Region, shapes: Mapping[str, Shape]
+    view: SceneView, likely: Mapping[str, float], region: Region, shapes: Mapping[str, Shape]
 ) -> dict[str, Hypothesis]:
     """What the region would be as each of the things, each as `likely` beforehand as it looks."""
     hypotheses = {}
     for name, probability in likely.items():
-        estimate = estimate_pose(shapes[name], region.surface, region.outline)
+        estimate = estimate_pose(shapes[name], region.surface, region.outline, view.bare)
         if estimate is not None:
             fits = math.exp(-((estimate.residual / MISFIT) ** 2) / 2)
             hypotheses[name] = Hypothesis(probability * fits, estimate)
@@ -227,7 +238,7 @@ def _whole(one: Sighting, other: Sighting, view: SceneView, shapes: Mapping[str,
     if abs(_top(one.region) - _top(other.region)) > STEP:
         return None
     region = view.union(one.region, other.region)
-    estimate = estimate_pose(shapes[name], region.surface, region.outline)
+    estimate = estimate_pose(shapes[name], region.surface, region.outline, view.bare)
     if estimate is None or estimate.residual > MISFIT or estimate.seen < one.hypotheses[name].estimate.seen:
         return None
     hypotheses = {**one.hypotheses, name: Hypothesis(one.hypotheses[name].probability, estimate)}
