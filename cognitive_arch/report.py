@@ -97,7 +97,8 @@ def result_text(result: dict[str, Any]) -> str:
         verdict,
         f"{result['good']} of {result['total']} actions worked, "
         f"speed {result['speed']:.2f}, {result['wall_s']:.1f} s",
-        f"kept as {result['run_id']} in {result['store']}; see: cogarch inspect {result['run_id']}",
+        f"kept as {result['run_id']} in {result['store']}; see: "
+        + _in_store(["cogarch", "inspect", result["run_id"]], Path(result["store"])),
     ]
     pictures = [path for path in result["artifacts"] if Path(path).name.startswith("step-")]
     lines.extend(f"wrote {path}" for path in result["artifacts"] if path not in pictures)
@@ -108,8 +109,11 @@ def result_text(result: dict[str, Any]) -> str:
 
 def resume_command(run_id: str, store: Path) -> str:
     """What to type to go on with a run, the store named only where it is not the usual one."""
+    return _in_store(["cogarch", "run", "--resume", run_id], store)
+
+
+def _in_store(words: list[str], store: Path) -> str:
     usual = Path(os.environ.get("COGARCH_STORE", "runs"))
-    words = ["cogarch", "run", "--resume", run_id]
     return shlex.join(words if store == usual else [*words, "--store", str(store)])
 
 

@@ -37,6 +37,8 @@ def load_table(trials: str, data: Path | None) -> TrialTable:
     return read_trials(trials)
 
 
+DRAWN = 4  # distributions in one picture
+ALIKE = 1e-9  # of probability
 GRAPHS = (".png", ".svg", ".dot", ".bif")
 
 
@@ -246,6 +248,7 @@ def ask(learned: Affordances, question: Question, picture: Path | None = None) -
         "start_counts": bool(question.start and learned.model.counts(np.array([question.start]))[0]),
         "model": learned.name,
         "trials": learned.trials,
+        "descriptors": {"manipulator": list(learned.names_m), "object": list(learned.names_o)},
     }
     cases: dict[str, Floats] = {}
     if question.goal is None:
@@ -257,7 +260,10 @@ def ask(learned: Affordances, question: Question, picture: Path | None = None) -
     if picture is not None:
         from cognitive_arch.affordances.figures import effects_picture
 
-        answer["files"] = [str(effects_picture(dict(list(cases.items())[:4]), picture))]
+        answer["files"] = [str(effects_picture(dict(list(cases.items())[:DRAWN]), picture))]
+        answer["drawn"] = list(cases)[:DRAWN]
+    asked = [question.action] if question.action else list(ACTIONS)
+    answer["never_tried"] = [action for action in asked if action not in learned.tried]
     return answer
 
 
@@ -283,12 +289,16 @@ def _choose(
         names = question.tools or tuple(oracle.learned.things_m)
         tools = [_manipulator(oracle, question, name) for name in names]
         ranked = oracle.select_tool(goal, question.action, tools, o, start)
+        things = {t.name: t for t in tools}
         cases = {
-            f"{question.action} with {t.name}": oracle.predict(question.action, t, o, start) for t in tools
+            f"{question.action} with {name}": oracle.predict(question.action, things[name], o, start)
+            for name in ranked
         }
         answer["kind"] = "tool"
     else:
         ranked = oracle.select_action(goal, m, o, start)
+        # What was never tried is told last, and chosen only where there is nothing else.
+        ranked = dict(sorted(ranked.items(), key=lambda item: item[0] not in oracle.learned.tried))
         if question.action is not None:
             ranked = {question.action: ranked[question.action]}
         cases = {_title(question, m, o, a): oracle.predict(a, m, o, start) for a in ranked}
@@ -307,13 +317,29 @@ def ask_text(answer: Mapping[str, Any]) -> str:
     """The answer of `query` for a terminal."""
     asked = answer["asked"]
     given = ", ".join(f"{k} {v}" for k, v in asked.items() if v is not None) or "nothing given"
-    lines = [f"{answer['model']}, {answer['trials']} trials; {given}"]
+    described = {len(names) for names in answer["descriptors"].values()}
+    counted = " and ".join(str(number) for number in sorted(described))
+    lines = [f"{answer['model']}, {answer['trials']} trials, {counted} descriptors; {given}"]
     if asked["start"] and not answer["start_counts"]:
         lines.append("start        not looked at: far from where things were tried, or not in the model")
+    if answer["never_tried"]:
+        lines.append(f"never tried  {', '.join(answer['never_tried'])}: the other actions' effects stand in")
     if answer["kind"] == "effects":
         lines.append(matrix_text(np.array(answer["effects"])))
     else:
         for row in answer["ranking"]:
             lines.append(f"  {row['name']:24} p({asked['goal']}) = {row['probability']:.3f}")
-        lines.append(f"best         {answer['choice']}")
+        tried = [row for row in answer["ranking"] if row["name"] not in answer["never_tried"]]
+        lines.append(f"best         {_best(tried or answer['ranking'])}")
+    if "drawn" in answer and len(answer["drawn"]) < len(answer.get("ranking", ())):
+        lines.append(f"drawn        the first {len(answer['drawn'])} of {len(answer['ranking'])}")
     return "\n".join([*lines, *(f"wrote {path}" for path in answer.get("files", []))])
+
+
+def _best(ranking: Sequence[Mapping[str, Any]]) -> str:
+    """The likeliest, or how many of them are as likely."""
+    top = ranking[0]["probability"]
+    alike = [row["name"] for row in ranking if top - row["probability"] < ALIKE]
+    if 1 < len(alike) == len(ranking):
+        return "none of them: all are as likely"
+    return " or ".join(alike) + (", which are as likely" if len(alike) > 1 else "")

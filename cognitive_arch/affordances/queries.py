@@ -161,7 +161,7 @@ def _thing(text: str, what: str, things: Mapping[str, Floats], names: Sequence[s
     missing = [name for name in names if name not in values]
     if missing:
         raise AffordanceError(f"the {what} lacks the descriptors {', '.join(missing)}")
-    return Thing(f"a {what} as described", np.array([values[name] for name in names]))
+    return Thing("(as described)", np.array([values[name] for name in names]))
 
 
 def question_table(

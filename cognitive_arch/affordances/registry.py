@@ -18,7 +18,7 @@ from cognitive_arch.affordances.baselines import ForestModel, LogisticModel, Maj
 from cognitive_arch.affordances.mixture import MixtureModel
 from cognitive_arch.affordances.model import EffectModel
 from cognitive_arch.affordances.networks import METHODS, network_class
-from cognitive_arch.affordances.trials import Floats, Names, TrialTable, checked
+from cognitive_arch.affordances.trials import ACTIONS, Floats, Names, TrialTable, checked
 from cognitive_arch.errors import AffordanceError, one_line, unknown
 
 DEFAULT = "default"
@@ -37,7 +37,8 @@ FORMAT = "cogarch-affordances-1"
 class Affordances:
     """A model, what it is called, and what it was learned from: the things it knows by name.
 
-    `things_m` and `things_o` are mean descriptors by name; `trials` says how many there were.
+    `things_m` and `things_o` are mean descriptors by name; `trials` says how many there were, `tried` with
+    which actions.
     """
 
     name: str
@@ -48,6 +49,7 @@ class Affordances:
     things_o: Mapping[str, Floats]
     trials: int
     source: str
+    tried: tuple[str, ...] = ACTIONS
 
     @classmethod
     def learn(cls, table: TrialTable, name: str, rng: np.random.Generator) -> Affordances:
@@ -63,6 +65,7 @@ class Affordances:
             _means(table.object, table.shape_o),
             len(np.unique(table.trial)),
             table.source,
+            tuple(name for number, name in enumerate(ACTIONS) if (table.action == number).any()),
         )
 
     def save(self, path: Path | str) -> None:
@@ -76,6 +79,7 @@ class Affordances:
             "things_o": {n: _plain(v) for n, v in self.things_o.items()},
             "trials": self.trials,
             "source": self.source,
+            "tried": list(self.tried),
             "parameters": self.model.to_json(),
         }
         text = (json.dumps(data) + "\n").encode()
@@ -97,6 +101,7 @@ class Affordances:
                 {n: np.array(v, np.float64) for n, v in data["things_o"].items()},
                 int(data["trials"]),
                 str(data["source"]),
+                tuple(str(name) for name in data.get("tried", ACTIONS)),
             )
         except (KeyError, TypeError, ValueError) as error:
             raise AffordanceError(

@@ -346,7 +346,7 @@ def table12(options: Options) -> Reproduced:
     )
     checks.append(
         Check(
-            "the model of the loop, from hands: rakes likeliest pull, then hooks, then sticks",
+            "the model of the loop, from hands: the rake likeliest pulls, then the hook, then the stick",
             "rake, hook, stick",
             _shares(expected),
             expected.get("rake", 0) > expected.get("hook", 0) > expected.get("stick", 0),

@@ -58,7 +58,7 @@ class Bar:
             self._progress.reset(self._task, total=total - done, visible=True)
             self._started = time.monotonic()
             if done:
-                self.notice(f"{done} of {total} {self._what} are there already")
+                self.notice(f"{min(done, total)} of {total} {self._what} are there already")
         self._progress.update(self._task, completed=done - self._before)
         tenth = 10 * done // max(total, 1)
         if not self._console.is_terminal and tenth > self._told:

@@ -115,8 +115,14 @@ def reproduce(name: str, options: Options) -> dict[str, Any]:
     if name not in REPRODUCTIONS:
         raise ConfigError(unknown("table or figure", name, REPRODUCTIONS))
     entry = REPRODUCTIONS[name]
+    with_trials = [key for key, one in REPRODUCTIONS.items() if one.function.startswith(_AFFORDANCES)]
+    if options.trials is not None and name not in with_trials:
+        raise ConfigError(f"{name} uses no affordance trials; --trials is for {', '.join(with_trials)}")
     started = time.perf_counter()
     found = entry.load()(options)
+    notes = list(found.numbers.get("notes", ()))
+    if options.episodes is not None:
+        notes.append(f"with {options.episodes} episodes a point (or splits), not as many as published")
     return {
         "name": name,
         "title": entry.title,
@@ -129,6 +135,7 @@ def reproduce(name: str, options: Options) -> dict[str, Any]:
             for c in found.checks
         ],
         **found.numbers,
+        **({"notes": notes} if notes else {}),
         "seed": options.seed,
         "files": [str(path) for path in found.files],
         "wall_s": round(time.perf_counter() - started, 3),

@@ -7,6 +7,7 @@ import logging
 import os
 import signal
 import threading
+import warnings
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
@@ -109,7 +110,9 @@ def in_processes(jobs: Iterable[T], work: Callable[[T], R], n: int) -> Iterator[
     try:
         yield from results
     finally:
-        results.close()  # ends the processes, whatever they are at
+        with warnings.catch_warnings():  # what was done and not asked for any more is done again next time
+            warnings.simplefilter("ignore", UserWarning)
+            results.close()  # ends the processes, whatever they are at
 
 
 def _single_threaded(work: Callable[[T], R], job: T) -> R:

@@ -102,7 +102,11 @@ def reproduce(
         Path | None, typer.Option(metavar="DIR", help="Folder with the data sets it needs.")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="DIR", help="Folder for its files [default: reproduced/NAME].")
+        Path | None,
+        typer.Option(
+            metavar="DIR",
+            help="Folder for its files [default: reproduced/NAME, with episodes and seed if given].",
+        ),
     ] = None,
     episodes: Annotated[
         int | None, typer.Option(help="Episodes a point (or splits), other than published.")
@@ -126,7 +130,8 @@ def reproduce(
         raise ConfigError(f"{episodes} episodes; valid: 1 or more")
     if protocol not in ("trial", "views", "published"):
         raise ConfigError(unknown("protocol", protocol, ("trial", "views", "published")))
-    folder = out or Path("reproduced") / name
+    named = [name, *([f"episodes-{episodes}"] if episodes else []), *([f"seed-{seed}"] if seed else [])]
+    folder = out or Path("reproduced") / "-".join(named)
 
     def work(on_rows: Callable[[int, int], None], on_notice: Callable[[str], None]) -> dict[str, Any]:
         options = reproduction.Options(

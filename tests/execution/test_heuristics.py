@@ -26,9 +26,15 @@ def test_parse_heuristics(text: str, expected: tuple[bool, bool, bool]) -> None:
     assert Heuristics.parse(str(parsed)) == parsed
 
 
-@pytest.mark.parametrize("text", ["", "hope", "all,none", "adaptability,,creativity"])
+@pytest.mark.parametrize("text", ["", "hope", "adaptability,,creativity"])
 def test_bad_heuristics(text: str) -> None:
     with pytest.raises(ConfigError, match="valid: adaptability, all, creativity, goal_maintenance, none"):
+        Heuristics.parse(text)
+
+
+@pytest.mark.parametrize("text", ["all,none", "none+adaptability", "creativity,all"])
+def test_all_and_none_stand_alone(text: str) -> None:
+    with pytest.raises(ConfigError, match=r"stands alone; valid together: adaptability, creativity"):
         Heuristics.parse(text)
 
 
