@@ -47,7 +47,9 @@ class Heuristics:
         chosen = [part.strip().replace("-", "_") for part in word.replace("+", ",").split(",")]
         for part in chosen:
             if part in ("all", "none"):
-                raise ConfigError(f"'{text}': {part} stands alone; valid together: {', '.join(sorted(names))}")
+                raise ConfigError(
+                    f"'{text}': {part} stands alone; valid together: {', '.join(sorted(names))}"
+                )
             if part not in names:
                 raise ConfigError(unknown("heuristic", part, [*names, "all", "none"]))
         return cls(**{name: name in chosen for name in names})

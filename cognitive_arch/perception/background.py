@@ -21,6 +21,7 @@ Mask = NDArray[np.uint8]  # (height, width), 255 on things
 SAMPLES = 2500  # pixels, at most, that tell the table's colour
 BINS = 32  # of the shares of red and green in a colour
 DARK = 6.0  # grey levels added before colours are divided: the darkest ones are mostly rounding
+LIT = 0.75  # of the table's pixels that are no brighter than where it is lit
 SPAN = 0.4  # of a side of the picture, from which on a piece at the border is not on the table
 REACH = 3.0  # pixels to either side of an outline, between which a thing's brightness jumps
 SOFT = 0.5  # of its contrast: a bright spot that jumps by less fades out, and is a reflection
@@ -30,11 +31,12 @@ MANY = 50  # pieces looked at for reflections; in a picture with more, something
 
 @dataclass(frozen=True)
 class Background:
-    """The table's `colour` (3,), RGB in grey levels, and its `noise`, the standard deviation in grey levels
-    of what is measured as `deviation`."""
+    """The table's `colour` (3,), RGB in grey levels, its `noise`, the standard deviation in grey levels of
+    what is measured as `deviation`, and its mean brightness where it is `lit`: half of it may be shaded."""
 
     colour: NDArray[np.float64]
     noise: float
+    lit: float
 
     @property
     def brightness(self) -> float:
@@ -65,15 +67,16 @@ def estimate_background(image: Image, ignore: NDArray[np.bool_] | None = None) -
         pixels = pixels[~ignore[::step, ::step].ravel().astype(np.bool_)]
     if not len(pixels):
         return None
-    pixels, colour = np.ascontiguousarray(pixels), np.empty(3)
+    pixels, colours = np.ascontiguousarray(pixels), np.empty((2, 3))
     count, tones = len(pixels), np.zeros((3, 256), np.int64)
     counts = np.zeros((BINS + 2, BINS + 2), np.int64)
-    kernels.commonest_colour(pixels, BINS, DARK, np.empty(count, np.int64), counts, tones, colour)
+    kernels.commonest_colour(pixels, BINS, DARK, LIT, np.empty(count, np.int64), counts, tones, colours)
+    lit = float(colours[1].mean())
     # Over all of the picture: a table whose colour changes from place to place is noisy in this sense, too.
-    off = np.abs(Background(colour, 0.0).matrix[:2, :3] @ pixels.T.astype(np.float32))
+    off = np.abs(Background(colours[0], 0.0, lit).matrix[:2, :3] @ pixels.T.astype(np.float32))
     off.partition(((count - 1) // 2, count // 2), axis=1)  # the median's middle two, with half its overhead
     noise = (off[:, (count - 1) // 2] + off[:, count // 2]) / 2
-    return Background(colour, 1.4826 * float(noise.max()))
+    return Background(colours[0], 1.4826 * float(noise.max()), lit)
 
 
 def without_surroundings(mask: Mask, ignore: NDArray[np.bool_] | None = None) -> Mask:

@@ -7,9 +7,10 @@ import numpy as np
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def commonest_colour(pixels, bins, dark, places, counts, tones, colour):  # type: ignore[no-untyped-def]
-    """Fill `colour` (3,) float64 with the medians of those of `pixels` (n, 3) uint8 whose shares of red and
-    green, `dark` added to their sum, lie in the fullest of `bins` by `bins` bins or in one beside it.
+def commonest_colour(pixels, bins, dark, lit, places, counts, tones, colours):  # type: ignore[no-untyped-def]
+    """Fill `colours` (2, 3) float64 with the medians of those of `pixels` (n, 3) uint8 whose shares of red
+    and green, `dark` added to their sum, lie in the fullest of `bins` by `bins` bins or in one beside it,
+    and with the tones that a part `lit` of them does not exceed.
 
     `places` (n,) int64, `counts` (bins + 2, bins + 2) and `tones` (3, 256) int64, both 0, are room to work.
     """
@@ -41,4 +42,8 @@ def commonest_colour(pixels, bins, dark, places, counts, tones, colour):  # type
             if low < 0 and 2 * below >= most:
                 low = tone
             tone += 1
-        colour[k] = (low + tone - 1) / 2
+        colours[0, k] = (low + tone - 1) / 2
+        while below < lit * most:
+            below += tones[k, tone]
+            tone += 1
+        colours[1, k] = tone - 1

@@ -33,7 +33,7 @@ Depth = NDArray[np.floating]  # (height, width), metres along the camera's z axi
 MIN_TOLERANCE = 16.0  # grey levels off the table's colour that are not noise
 NOISE_FACTOR = 5.0  # standard deviations of the table's own noise that are not yet a thing
 UMBRA = 0.3  # of the table's brightness: what is darker is no shadow any more, but dark itself
-MIN_LIGHT, LIGHT = 50.0, 0.5  # grey levels, and share of the table's brightness: what adds more is no shade
+MIN_LIGHT, LIGHT = 50.0, 0.25  # grey levels, and share of the table's brightness: what adds more is no shade
 BRIGHT_TABLE = 60.0  # mean of the three colours from which on darkness means something
 RISE, CEILING = 0.004, 0.45  # m above the table between which things are
 FLAT = 8  # grey levels between neighbours that make no texture
@@ -87,7 +87,7 @@ class ColourSegmenter(_Segmenter):
         limit = max(MIN_TOLERANCE, NOISE_FACTOR * table.noise)
         bright = table.brightness
         darkest = UMBRA * bright if bright > BRIGHT_TABLE else 0.0
-        brightest = bright + max(MIN_LIGHT, LIGHT * bright)
+        brightest = table.lit + max(MIN_LIGHT, LIGHT * table.lit)
         low, high = (128 - limit, 128 - limit, darkest), (128 + limit, 128 + limit, brightest)
         mask = np.asarray(cv2.bitwise_not(cv2.inRange(table.deviation(image), low, high)), np.uint8)
         mask = np.asarray(cv2.medianBlur(mask, 3), np.uint8)

@@ -205,11 +205,24 @@ def test_a_quarter_turn_at_most_exchanges_the_halves(corners: NDArray[np.float64
     here, there = describe(mask), describe(np.ascontiguousarray(np.rot90(mask)))
     sides = sorted(cv2.minAreaRect(cv2.findNonZero(mask))[1])
     assume(sides[0] < 0.97 * sides[1])  # a square has two main axes
+    assume(_smallest_rectangles(mask) == 1)  # of a kite, two are mirror images of each other
     exchanged = Descriptions(here.whole, _upside_down(here.bottom), _upside_down(here.top))
     halves = there.vector(["top", "bottom"])
     assert any(
         halves == pytest.approx(both.vector(["top", "bottom"]), abs=2e-4) for both in (here, exchanged)
     )
+
+
+def _smallest_rectangles(mask: Mask) -> int:
+    """How many rectangles around it are as small as the smallest."""
+    corners = cv2.convexHull(cv2.findNonZero(mask)).reshape(-1, 2).astype(np.float64)
+    edges = np.roll(corners, -1, axis=0) - corners
+    areas: dict[float, float] = {}
+    for along in edges / np.linalg.norm(edges, axis=1, keepdims=True):
+        across = np.array([-along[1], along[0]])
+        turn = round(math.degrees(math.atan2(along[1], along[0])) % 90, 6) % 90
+        areas[turn] = float(np.ptp(corners @ along) * np.ptp(corners @ across))
+    return sum(area < min(areas.values()) * (1 + 1e-6) for area in areas.values())
 
 
 def _upside_down(half: object) -> dict[str, float]:

@@ -73,6 +73,27 @@ def test_half_covered_things_are_found_by_the_edges_that_are_their_own(kept: flo
         assert found.sigma > whole.sigma
 
 
+@pytest.mark.parametrize("yaw", [-0.2, -0.13, 0.0])
+def test_a_rake_of_which_a_corner_is_in_view_is_not_taken_to_lie_across_the_view(yaw: float) -> None:
+    rake = ToolShape(type="tool", length=0.34, width=0.018, bar=0.14)
+    surface, outline = points_of(rake, -0.46, -0.2, yaw)
+    # The picture ends across the bar's corner with the shaft.
+    surface, outline = (
+        rows[(rows[:, 0] < -0.53) & (rows[:, 1] - 0.7 * (rows[:, 0] + 0.6) > -0.21)]
+        for rows in (surface, outline)
+    )
+
+    def bare(places: np.ndarray) -> np.ndarray:
+        in_view = (places[:, 0] < -0.53) & (places[:, 1] - 0.7 * (places[:, 0] + 0.6) > -0.21)
+        near = np.linalg.norm(places[:, None, :2] - surface[None, ::5, :2], axis=2).min(axis=1) < 0.006
+        return np.asarray(in_view & ~near)
+
+    found = estimate_pose(rake, surface, outline, bare)
+    assert found is not None
+    assert found.position[:2] == pytest.approx((-0.46, -0.2), abs=0.01)
+    assert found.seen < 0.5
+
+
 def test_another_shape_does_not_fit() -> None:
     surface, outline = points_of(Box(type="box", size=(0.075, 0.055, 0.02)), -0.4, 0.1, 0.3)
     small = estimate_pose(Cylinder(type="cylinder", radius=0.02, height=0.02), surface, outline)

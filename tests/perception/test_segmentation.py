@@ -59,6 +59,23 @@ def test_a_thing_is_found_and_its_shadow_is_not(colour: tuple[int, int, int]) ->
     assert overlap(mask, thing) > 0.97
 
 
+@pytest.mark.parametrize("share", [0.3, 0.5, 0.6])
+def test_a_sharp_shadow_over_half_of_the_table_hides_nothing_that_is_lit(share: float) -> None:
+    image = table(BROWN).astype(np.float64)
+    dark, lit = disc((20, 30), 12), disc((135, 80), 15)
+    image[dark], image[lit] = RED, RED
+    image[:, : round(share * 160)] *= 0.6
+    mask = make_segmenter("colour").segment(rounded(image)) > 0
+    assert overlap(mask, dark | lit) > 0.95
+
+
+@pytest.mark.parametrize("brightness", [235, 250])
+def test_white_things_are_found_on_a_grey_table(brightness: int) -> None:
+    image, white = table((180, 180, 180)).astype(np.float64), disc((80, 60), 20)
+    image[white] = brightness
+    assert overlap(make_segmenter("colour").segment(rounded(image)) > 0, white) > 0.95
+
+
 @pytest.mark.parametrize("colour", [BROWN, DARK_GREEN, GREY])
 def test_a_reflection_is_no_thing_and_a_white_disc_is(colour: tuple[int, int, int]) -> None:
     y, x = np.mgrid[:120, :160]
