@@ -18,6 +18,7 @@ from cognitive_arch.affordances.trials import ACTIONS, BINS, EDGES, N_BINS, Floa
 from cognitive_arch.errors import AffordanceError, one_line
 
 PICTURES = (".png", ".svg")
+ABREAST = 4  # panels in a row
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000")
 
 
@@ -178,18 +179,23 @@ def curve_picture(
 
 
 def motion_picture(tables: Mapping[str, TrialTable], path: Path | str, limit: float = 0.25) -> Path:
-    """Displacements by manipulator and action, one row of panels per table (Fig. 47). The robot is below."""
-    columns = max(len(named(t.manipulator)) for t in tables.values())
-    figure = _figure(2.6 * columns + 0.6, 2.8 * len(tables) + 0.4)
-    grid: Any = figure.subplots(len(tables), columns, squeeze=False)
-    for row, (title, table) in enumerate(tables.items()):
-        for column, axis in enumerate(grid[row]):
-            names = named(table.manipulator)
-            if column >= len(names):
-                axis.set_visible(False)
-                continue
-            _motions(axis, table.take(table.manipulator == names[column]), limit)
-            axis.set_title(f"{title}: {names[column]}", fontsize=9)
+    """Displacements by manipulator and action, a panel each, those of a table in rows of their own (Fig. 47).
+    The robot is below."""
+    panels = {title: named(table.manipulator) for title, table in tables.items()}
+    columns = min(ABREAST, max(map(len, panels.values())))
+    rows = [
+        (title, names[start : start + columns])
+        for title, names in panels.items()
+        for start in range(0, len(names), columns)
+    ]
+    figure = _figure(2.6 * columns + 0.6, 2.8 * len(rows) + 0.4)
+    grid: Any = figure.subplots(len(rows), columns, squeeze=False)
+    for axes, (title, names) in zip(grid, rows, strict=True):
+        for axis in axes[len(names) :]:
+            axis.set_visible(False)
+        for axis, name in zip(axes, names, strict=False):
+            _motions(axis, tables[title].take(tables[title].manipulator == name), limit)
+            axis.set_title(f"{title}: {name}", fontsize=9)
     grid[0][0].legend(fontsize=7, loc="upper left")
     return _save(figure, path)
 

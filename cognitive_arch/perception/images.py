@@ -23,6 +23,7 @@ from cognitive_arch.errors import PerceptionError, one_line
 Image = NDArray[np.uint8]  # (height, width, 3), RGB
 
 MAX_PIXELS = 50_000_000
+COMPLETE = 0.95  # of the frames that a video announces, which some only estimate
 JPEG_NOISE = 12  # grey levels that compression leaves in what was black
 IMAGE_SUFFIXES = (".bmp", ".gif", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp")
 VIDEO_SUFFIXES = (".avi", ".m4v", ".mkv", ".mov", ".mp4", ".mpeg", ".mpg", ".webm")
@@ -37,7 +38,8 @@ def frames(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
     video ("clip.mp4-00012", counted from 0).
 
     An image of a folder that cannot be read comes as its error, so that one broken file does not hide the
-    others. Raises `PerceptionError` for anything else that cannot be read.
+    others, and so does the end of a video that is cut off. Raises `PerceptionError` for anything else that
+    cannot be read.
     """
     if os.path.isdir(path):  # unlike Path's, this raises for no name
         yield from _folder(path)
@@ -148,7 +150,7 @@ def _folder(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
             yield name, error
 
 
-def _video(path: Path) -> Iterator[tuple[str, Image]]:
+def _video(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
     import cv2
 
     _check_file(path, "video", VIDEO_SUFFIXES)
@@ -176,6 +178,10 @@ def _video(path: Path) -> Iterator[tuple[str, Image]]:
             count += 1
         if count == 0:
             raise PerceptionError(f"the video {_quoted(path)} has no frame that can be read")
+        announced = int(reader.get(cv2.CAP_PROP_FRAME_COUNT))
+        if count < COMPLETE * announced - 1:
+            told = f"only {count} of about {announced} frames of {_quoted(path)} could be read: is it cut off?"
+            yield f"{path.name}-{count:05d}", PerceptionError(told)
     except cv2.error as error:
         raise PerceptionError(f"cannot read the video {_quoted(path)}: {_reason(error)}") from None
     finally:

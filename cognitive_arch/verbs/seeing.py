@@ -83,7 +83,7 @@ def see(
                 if view is not None:
                     view.check(size)
             except PerceptionError as error:
-                if not os.path.isdir(source):
+                if not (os.path.isdir(source) or image is error):
                     raise
                 answers.append({"image": name, "error": str(error)})  # the folder's others may be usable
                 continue

@@ -11,7 +11,7 @@ from cognitive_arch.affordances.queries import Lookup, Oracle, goal_mask, matrix
 from cognitive_arch.affordances.registry import Affordances
 from cognitive_arch.affordances.structures import named_structure
 from cognitive_arch.affordances.transfer import JOINT, TOOLS, selection_table, success_rates, transfer_curve
-from cognitive_arch.affordances.trials import TrialTable, write_trials
+from cognitive_arch.affordances.trials import TrialTable, action_index, write_trials
 from cognitive_arch.errors import AffordanceError
 from tests.affordances.synthetic import synthetic_frame, synthetic_trials
 
@@ -175,6 +175,29 @@ def test_it_is_told_when_the_place_makes_no_difference(cogarch: Any, files: Path
     assert far["effects"] == none["effects"] != near["effects"]
     assert "not looked at" in cogarch(*asked, "--start=99,99").out
     assert "not looked at" not in cogarch(*asked, "--start=-0.45,0.1").out
+
+
+def test_ties_and_what_was_never_tried_are_told(cogarch: Any, trials: TrialTable, tmp_path: Path) -> None:
+    pulls = trials.take(trials.action == action_index("pull"))
+    for model in ("majority", "default"):
+        Affordances.learn(pulls, model, np.random.default_rng(0)).save(tmp_path / f"{model}.json")
+    tie = cogarch("query", str(tmp_path / "majority.json"), "--action", "pull", "--goal", "closer")
+    assert "best         none of them: all are as likely" in tie.out
+    assert "never tried" not in tie.out
+    asked = ("query", str(tmp_path / "default.json"), "--manipulator", "rake", "--goal", "closer")
+    assert "never tried  tapFromRight, tapFromLeft, push:" in cogarch(*asked).out
+    assert "best         pull" in cogarch(*asked).out
+    answer = cogarch(*asked, "--json").json
+    assert (answer["choice"], answer["never_tried"]) == ("pull", ["tapFromRight", "tapFromLeft", "push"])
+
+
+def test_a_picture_shows_the_likeliest_of_many(cogarch: Any, tmp_path: Path) -> None:
+    tools = ("--tools", "Stick,Nail,Thick-stick,Short-stick,Rake")
+    path = tmp_path / "effects.png"
+    found = cogarch("query", "--action", "pull", "--goal", "closer", *tools, "--picture", str(path), "--json")
+    assert found.json["drawn"][0] == f"pull with {found.json['choice']}" == "pull with Rake"
+    assert len(found.json["drawn"]) == 4
+    assert path.stat().st_size > 5000
 
 
 def test_things_may_be_shown_in_a_picture(cogarch: Any, learned: Affordances, tmp_path: Path) -> None:

@@ -74,5 +74,13 @@ def test_a_figure_is_recomputed_with_its_checks(cogarch: Any, tmp_path: Path) ->
     assert checks["actions without noise"]["holds"]
     assert checks["actions without noise"]["ours"] == "4.00, 4.00, 4.00, 4.00 actions"
     assert len(answer.json["points"]) == 20
+    assert any("3 episodes a point" in note for note in answer.json["notes"])
     for name in ("rows.csv", "rows.parquet", "summary.csv", "index.html", "figures/simple-both.png"):
         assert (tmp_path / "fig58" / name).stat().st_size > 0, name
+
+
+def test_trials_are_refused_where_none_are_used(cogarch: Any, tmp_path: Path) -> None:
+    found = cogarch("reproduce", "fig58", "--trials", "t.csv", "--out", str(tmp_path / "out"))
+    assert (found.code, len(found.err.splitlines())) == (2, 1)
+    assert "--trials is for table6" in found.err
+    assert not (tmp_path / "out").exists()

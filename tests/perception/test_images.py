@@ -281,6 +281,15 @@ def test_a_broken_video_writes_nothing(
     assert capfd.readouterr() == ("", "")
 
 
+def test_a_video_that_is_cut_off_says_so_after_what_could_be_read(tmp_path: Path) -> None:
+    path = filmed(tmp_path / "clip.avi", 20)
+    assert all(isinstance(frame, np.ndarray) for _, frame in frames(path))
+    path.write_bytes(path.read_bytes()[: path.stat().st_size // 2])
+    found = [frame for _, frame in frames(path)]
+    assert 0 < len(found) - 1 < 20
+    assert f"only {len(found) - 1} of about 20 frames" in str(found[-1])
+
+
 class FakeCapture:
     """Stands in for OpenCV's: as many frames as `left`, then `end`."""
 

@@ -98,6 +98,17 @@ def test_what_a_stick_cannot_do(complex_scene: DrakeEnvironment) -> None:
 
 
 @pytest.mark.physics
+def test_the_other_hand_pushes_with_a_rake_by_sight(domain: Domain, scene: Scene) -> None:
+    """Its bar is cut by the border of the picture, and the way is oblique."""
+    environment = DrakeEnvironment(domain, scene, jitter=0.02)
+    environment.reset(4)
+    assert environment.execute(action("graspWith(Rake,RightHand)")).outcome is Outcome.SUCCESS
+    before = environment.robot.truth.pose("Ham").translation()[0]
+    assert environment.execute(action("push(Ham,Rake,RightHand)")).reason is FailureReason.NONE
+    assert environment.robot.truth.pose("Ham").translation()[0] < before - 0.10
+
+
+@pytest.mark.physics
 @pytest.mark.parametrize("hand", ["LeftHand", "RightHand"])
 def test_pull_brings_it_within_reach_and_keeps_the_tool(domain: Domain, scene: Scene, hand: str) -> None:
     environment = DrakeEnvironment(domain, mirrored(scene) if hand == "LeftHand" else scene)
