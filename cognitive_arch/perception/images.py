@@ -180,7 +180,9 @@ def _video(path: Path) -> Iterator[tuple[str, Image | PerceptionError]]:
             raise PerceptionError(f"the video {_quoted(path)} has no frame that can be read")
         announced = int(reader.get(cv2.CAP_PROP_FRAME_COUNT))
         if count < COMPLETE * announced - 1:
-            told = f"only {count} of about {announced} frames of {_quoted(path)} could be read: is it cut off?"
+            told = (
+                f"only {count} of about {announced} frames of {_quoted(path)} could be read: is it cut off?"
+            )
             yield f"{path.name}-{count:05d}", PerceptionError(told)
     except cv2.error as error:
         raise PerceptionError(f"cannot read the video {_quoted(path)}: {_reason(error)}") from None
