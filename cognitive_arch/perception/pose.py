@@ -97,7 +97,8 @@ def _by_outline(
         """How far off in all, how much of it is amiss, and where."""
         pose = _fit(distance, edge, start, turns=not shape.is_round)
         outside = float(np.mean(distance(_local(covered, pose)) > 2 * OUTLIER))
-        missing = 0.0 if bare is None else float(np.mean(bare(_placed(inside, pose, top))))
+        seen_past = bare(_placed(inside, pose, top)) if bare is not None else np.zeros(0)
+        missing = float(np.mean(seen_past)) if len(seen_past) else 0.0
         off = math.hypot(_rms(distance(_local(edge, pose))), AMISS * outside, AMISS * missing)
         return off, max(outside, missing), pose
 
