@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -33,6 +33,8 @@ NEARER = 0.006  # m by which what covers an edge is nearer
 MISFIT = 0.003  # m of residual at which a shape becomes unlikely
 SEEN = 0.25  # of a thing, below which its place is not told
 WHOLE = 0.9  # of a thing, from which on its shape is taken to be in view
+SURE = 0.5  # probability from which on a region is taken to be one thing
+SLACK = 0.002  # m below a thing's underside that may still be its own
 POSSIBLE = 1e-3  # probability below which a label is not tried
 
 
@@ -73,6 +75,11 @@ class Sighting:
         """Whether it is known, and nearly all of it in view."""
         name = self.label
         return name != UNKNOWN and self.hypotheses[name].estimate.seen > WHOLE
+
+    @property
+    def chance(self) -> float:
+        """How likely it is what it most likely is, 0 for something unknown."""
+        return 0.0 if self.label == UNKNOWN else self.hypotheses[self.label].probability
 
     @property
     def label(self) -> str:
@@ -120,7 +127,7 @@ class SceneView:
                 continue
             mask = np.zeros(raised.shape, np.bool_)
             mask[rows, columns] = labels == label
-            yield self._region(_grown(mask, raised))
+            yield self.region(_grown(mask, raised))
 
     def _steps(self, rows: slice, columns: slice) -> Mask:
         """Where colour or height differ from the pixel to the left or above."""
@@ -139,7 +146,8 @@ class SceneView:
             found[a] |= (shade > SHADE) | (np.abs(z[a] - z[b]) > STEP)
         return found
 
-    def _region(self, mask: Mask) -> Region:
+    def region(self, mask: Mask) -> Region:
+        """The places of these pixels, and of those at their own edges."""
         inner = cv2.erode(mask.view(np.uint8), np.ones((3, 3), np.uint8), borderValue=0)
         edge = mask & (inner == 0)
         edge[[0, -1]] = edge[:, [0, -1]] = False  # where the image ends the thing may go on
@@ -182,13 +190,40 @@ def _grown(mask: Mask, raised: Mask) -> Mask:
 
 def sightings(view: SceneView, classify: Classify, shapes: Mapping[str, Shape]) -> list[Sighting]:
     """What is in view. `shapes` are those of all things that there may be; `classify` names regions."""
-    found = [_sighting(view, region, classify, shapes) for region in view.regions()]
-    return _joined([sighting for sighting in found if sighting is not None], view, shapes)
+    found = [part for region in view.regions() for part in _layers(view, region, classify, shapes)]
+    return _joined(found, view, shapes)
 
 
-def _sighting(
+def _layers(
     view: SceneView, region: Region, classify: Classify, shapes: Mapping[str, Shape]
-) -> Sighting | None:
+) -> list[Sighting]:
+    """The region as one thing; or, where that fits nothing, as a thing on top of others.
+
+    Layers of one colour, or with dark sides, are not cut apart by any step: a slice from above shows which
+    thing is on top, and what is below its underside is something else.
+    """
+    whole = _sighting(view, region, classify, shapes)
+    if whole.chance > SURE:
+        return [whole]
+    height, top = view.points[:, :, 2], _top(region)
+    slices = []
+    for thickness in sorted({shape.height for shape in shapes.values()}):
+        part = region.mask & (height > top - thickness - SLACK)
+        if SMALLEST <= np.count_nonzero(part) <= np.count_nonzero(region.mask) - SMALLEST:
+            one = _sighting(view, view.region(part), classify, shapes)
+            if one.chance > SURE and shapes[one.label].height >= thickness:
+                slices.append(one)
+    if not slices:
+        return [whole]
+    above = max(slices, key=lambda one: one.chance)
+    lower = region.mask & (height < top - shapes[above.label].height - SLACK)
+    if np.count_nonzero(lower) < SMALLEST:
+        return [whole]
+    above = replace(above, region=view.region(region.mask & ~lower))
+    return [above, *_layers(view, view.region(lower), classify, shapes)]
+
+
+def _sighting(view: SceneView, region: Region, classify: Classify, shapes: Mapping[str, Shape]) -> Sighting:
     likely = dict(classify(view.color, region.mask))
     known = {name: p for name, p in likely.items() if name in shapes and p > POSSIBLE}
     unknown = 1.0 - sum(known.values())

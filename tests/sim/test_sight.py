@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import pytest
@@ -194,3 +196,13 @@ def test_random_scenes_piles_and_full_hands(seed: int) -> None:
         assert np.median(list(look.errors.values())) < 0.005
         assert max(look.errors.values()) < 0.012
         assert len(look.wrong) + len(look.overlooked) <= 0.01 * look.atoms
+
+
+@pytest.mark.parametrize(("seed", "eyes"), [(30, {}), (70, {}), (9, {"eye_noise": SENSOR, "shadows": True})])
+def test_layers_of_one_colour_and_layers_in_the_shadow_are_told_apart(
+    seed: int, eyes: dict[str, Any]
+) -> None:
+    """In 30 and 70 a bun lies on a bun, in 9 the sides of two boxes are dark."""
+    piled = list(itertools.islice(looks(seed, **eyes), 2))[1]
+    assert piled.strangers == 0
+    assert piled.mistaken("on") == 0
